@@ -1,0 +1,127 @@
+"""WGS84 <-> local ENU <-> each autopilot's own NED: the only place where axes swap.
+
+Missions, planners, logs and the web page use one frame alone: local ENU in metres around the mission's
+origin (`LocalFrame`). Every PX4 has a NED frame of its own, with its origin where its estimator started,
+and projects latitude and longitude onto it from a sphere (`AutopilotFrame`). docs/conventions.md has a drawing.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+import pymap3d
+
+Array = npt.NDArray[np.float64]
+
+PX4_EARTH = pymap3d.Ellipsoid(6_371_000.0, 6_371_000.0)
+"""PX4's map projection takes the earth for a sphere of this radius [m]."""
+
+Latitude = Annotated[float, msgspec.Meta(ge=-85.0, le=85.0)]
+Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
+Altitude = Annotated[float, msgspec.Meta(ge=-500.0, le=9000.0)]
+
+
+class GeodeticPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A place on earth (WGS84), its altitude above mean sea level as autopilots report it."""
+
+    latitude_deg: Latitude
+    longitude_deg: Longitude
+    altitude_amsl_m: Altitude = 0.0
+
+
+@dataclass(frozen=True)
+class LocalFrame:
+    """The mission's frame: ENU [m], tangent to the ellipsoid at `origin`.
+
+    Example:
+        >>> frame = LocalFrame(GeodeticPoint(latitude_deg=47.4, longitude_deg=8.5, altitude_amsl_m=490.0))
+        >>> place = frame.geodetic(np.array([100.0, 0.0, 20.0]))
+        >>> bool(place.longitude_deg > 8.5), round(place.altitude_amsl_m, 1)
+        (True, 510.0)
+    """
+
+    origin: GeodeticPoint
+
+    def geodetic_arrays(self, points_enu_m: Array) -> tuple[Array, Array, Array]:
+        """Latitude [deg], longitude [deg] and altitude AMSL [m], each (...), of (..., 3) ENU points [m]."""
+        east, north, up = np.moveaxis(np.asarray(points_enu_m, dtype=float), -1, 0)
+        o = self.origin
+        return pymap3d.enu2geodetic(east, north, up, o.latitude_deg, o.longitude_deg, o.altitude_amsl_m)
+
+    def geodetic(self, point_enu_m: Array) -> GeodeticPoint:
+        """The place on earth of one (3,) ENU point [m]."""
+        latitude, longitude, altitude = self.geodetic_arrays(point_enu_m)
+        return GeodeticPoint(
+            latitude_deg=float(latitude), longitude_deg=float(longitude), altitude_amsl_m=float(altitude)
+        )
+
+    def enu(self, latitude_deg: npt.ArrayLike, longitude_deg: npt.ArrayLike, altitude_amsl_m: npt.ArrayLike) -> Array:
+        """(..., 3) ENU points [m] of places on earth given by (...) arrays or numbers."""
+        o = self.origin
+        east, north, up = pymap3d.geodetic2enu(
+            np.asarray(latitude_deg, dtype=float),
+            np.asarray(longitude_deg, dtype=float),
+            np.asarray(altitude_amsl_m, dtype=float),
+            o.latitude_deg,
+            o.longitude_deg,
+            o.altitude_amsl_m,
+        )
+        return np.stack(np.broadcast_arrays(east, north, up), axis=-1)
+
+
+@dataclass(frozen=True)
+class AutopilotFrame:
+    """One autopilot's NED frame [m]: its GPS_GLOBAL_ORIGIN, projected as PX4 does (a sphere; down is altitude).
+
+    `ground_offset_m` is what this autopilot's altitude reads too high when it stands on the ground, a boot-to-boot
+    error of barometer and GNSS; it is measured before arming and taken out here.
+    """
+
+    origin: GeodeticPoint
+    mission: LocalFrame
+    ground_offset_m: float = 0.0
+
+    def ned(self, points_enu_m: Array) -> Array:
+        """(..., 3) mission ENU points [m] in this autopilot's NED frame."""
+        latitude, longitude, altitude = self.mission.geodetic_arrays(points_enu_m)
+        o = self.origin
+        east, north, _ = pymap3d.geodetic2enu(
+            latitude, longitude, 0.0, o.latitude_deg, o.longitude_deg, 0.0, ell=PX4_EARTH
+        )
+        return np.stack((north, east, o.altitude_amsl_m - altitude - self.ground_offset_m), axis=-1)
+
+    def enu(self, points_ned_m: Array) -> Array:
+        """(..., 3) points of this autopilot's NED frame in mission ENU [m]."""
+        north, east, down = np.moveaxis(np.asarray(points_ned_m, dtype=float), -1, 0)
+        o = self.origin
+        drop = -(north**2 + east**2) / (2.0 * PX4_EARTH.semimajor_axis)  # onto the sphere's surface
+        latitude, longitude, _ = pymap3d.enu2geodetic(
+            east, north, drop, o.latitude_deg, o.longitude_deg, 0.0, ell=PX4_EARTH
+        )
+        return self.mission.enu(latitude, longitude, o.altitude_amsl_m - down - self.ground_offset_m)
+
+
+def swap_enu_ned(vectors_m: Array) -> Array:
+    """(..., 3) vectors from ENU to NED or back: the same swap both ways, for parallel axes."""
+    v = np.asarray(vectors_m, dtype=float)
+    return np.stack((v[..., 1], v[..., 0], -v[..., 2]), axis=-1)
+
+
+def heading_rad(velocity_enu_m_s: Array) -> Array:
+    """Compass heading (0 north, pi/2 east), in (-pi, pi], of (..., 2 or 3) ENU vectors."""
+    return np.arctan2(velocity_enu_m_s[..., 0], velocity_enu_m_s[..., 1])
+
+
+def rotation_enu_from_flu(quaternion_ned_frd: Array) -> Array:
+    """(3, 3) rotation from the body's FLU axes to ENU, of a MAVLink attitude quaternion (w, x, y, z; FRD -> NED)."""
+    w, x, y, z = np.asarray(quaternion_ned_frd, dtype=float) / np.linalg.norm(quaternion_ned_frd)
+    ned_from_frd = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    return swap_enu_ned((ned_from_frd * np.array([1.0, -1.0, -1.0])).T).T

@@ -1,0 +1,163 @@
+"""Distances to everything solid or forbidden in a world: packed arrays, and compiled functions over them.
+
+`clearance` is the distance lambda of the paper (eqs. 3 and 13): from a point to the nearest surface of a threat, a peak's
+body or an obstacle, flat ground excluded, negative inside. `terrain_height` is the ground of eq. 23.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from missions.kernels import compiled
+from missions.world import BASE_HEIGHT_SHARE, World
+
+Array = npt.NDArray[np.float64]
+
+FAR_M = 1e6
+"""The clearance of a world with nothing in it [m]."""
+
+PROFILE_SAMPLES = 12
+"""Points of a peak's profile that are looked at before the nearest one is sharpened."""
+
+
+class Obstacles(NamedTuple):
+    """The solid and forbidden things of a world as arrays, which compiled code can read."""
+
+    boxes: Array
+    """(n, 6): centre east, north, up; half size east, north, up [m]."""
+    cylinders: Array
+    """(n, 5): centre east, north; radius; base; top [m]."""
+    threats: Array
+    """(n, 3): centre east, north; radius [m]."""
+    peaks: Array
+    """(n, 5): centre east, north; slope x_s = y_s; height; bottom radius [m]."""
+
+
+def pack(world: World, *, with_threats: bool = True) -> Obstacles:
+    """Arrays of everything in `world` but its movers; sensors and collisions do without the threats."""
+    boxes = [(*box.centre_m, *box.half_m) for box in world.boxes]
+    cylinders = [(*c.centre_m, c.radius_m, c.base_m, c.top_m) for c in world.cylinders]
+    threats = [(*threat.centre_m, threat.radius_m) for threat in world.threats if with_threats]
+    peaks = [(*peak.centre_m, peak.slope_m, peak.top_m, peak.radius_m) for peak in world.peaks]
+    return Obstacles(
+        boxes=np.array(boxes, dtype=float).reshape(-1, 6),
+        cylinders=np.array(cylinders, dtype=float).reshape(-1, 5),
+        threats=np.array(threats, dtype=float).reshape(-1, 3),
+        peaks=np.array(peaks, dtype=float).reshape(-1, 5),
+    )
+
+
+def clearance(points_enu_m: Array, obstacles: Obstacles) -> Array:
+    """Distances [m] from (n, 3) ENU points to the nearest surface; negative inside, `FAR_M` with no obstacle."""
+    return _clearance_of_points(np.ascontiguousarray(points_enu_m, dtype=float).reshape(-1, 3), obstacles)
+
+
+def terrain_height(points_enu_m: Array, obstacles: Obstacles) -> Array:
+    """Height of the ground [m] below (n, 2 or 3) ENU points: the sum of all peaks (eq. 23)."""
+    points = np.asarray(points_enu_m, dtype=float)
+    east, north = points[..., 0, None], points[..., 1, None]
+    peaks = obstacles.peaks
+    squared = (east - peaks[:, 0]) ** 2 + (north - peaks[:, 1]) ** 2
+    return np.sum(peaks[:, 3] * np.exp(-squared / peaks[:, 2] ** 2), axis=-1)
+
+
+@compiled
+def _clearance_of_points(points_enu_m: Array, obstacles: Obstacles) -> Array:
+    out = np.empty(len(points_enu_m))
+    for i in range(len(points_enu_m)):
+        out[i] = clearance_at(points_enu_m[i, 0], points_enu_m[i, 1], points_enu_m[i, 2], obstacles)
+    return out
+
+
+@compiled
+def clearance_at(east: float, north: float, up: float, obstacles: Obstacles) -> float:
+    """`clearance` of one point, to be called from compiled code."""
+    nearest = FAR_M
+    boxes, cylinders, threats, peaks = obstacles.boxes, obstacles.cylinders, obstacles.threats, obstacles.peaks
+    for i in range(len(boxes)):
+        nearest = min(nearest, _to_box(east, north, up, boxes[i]))
+    for i in range(len(cylinders)):
+        nearest = min(nearest, _to_cylinder(east, north, up, cylinders[i]))
+    for i in range(len(threats)):
+        de, dn = east - threats[i, 0], north - threats[i, 1]
+        nearest = min(nearest, np.sqrt(de * de + dn * dn + up * up) - threats[i, 2])  # eq. 22
+    for i in range(len(peaks)):
+        nearest = min(nearest, _to_peak(east, north, up, peaks[i], nearest))
+    return nearest
+
+
+@compiled
+def terrain_height_at(east: float, north: float, obstacles: Obstacles) -> float:
+    """`terrain_height` of one point, to be called from compiled code."""
+    height = 0.0
+    peaks = obstacles.peaks
+    for i in range(len(peaks)):
+        de, dn = east - peaks[i, 0], north - peaks[i, 1]
+        height += peaks[i, 3] * np.exp(-(de * de + dn * dn) / (peaks[i, 2] * peaks[i, 2]))
+    return height
+
+
+@compiled
+def _to_box(east: float, north: float, up: float, box: Array) -> float:
+    de, dn, du = abs(east - box[0]) - box[3], abs(north - box[1]) - box[4], abs(up - box[2]) - box[5]
+    inside = min(max(de, max(dn, du)), 0.0)
+    de, dn, du = max(de, 0.0), max(dn, 0.0), max(du, 0.0)
+    return np.sqrt(de * de + dn * dn + du * du) + inside
+
+
+@compiled
+def _to_cylinder(east: float, north: float, up: float, cylinder: Array) -> float:
+    de, dn = east - cylinder[0], north - cylinder[1]
+    radial = np.sqrt(de * de + dn * dn) - cylinder[2]
+    axial = max(cylinder[3] - up, up - cylinder[4])
+    inside = min(max(radial, axial), 0.0)
+    radial, axial = max(radial, 0.0), max(axial, 0.0)
+    return np.sqrt(radial * radial + axial * axial) + inside
+
+
+@compiled
+def _to_peak(east: float, north: float, up: float, peak: Array, nearer_than: float) -> float:
+    """Distance to a Gaussian hill of revolution: the nearest point of its profile z(u) = H exp(-u^2 / s^2).
+
+    With r the distance from the axis, the squared distance d(u) = (u - r)^2 + (z(u) - up)^2 may have several
+    minima between where the vertical and the horizontal through the point meet the profile: a coarse look
+    finds the lowest, safeguarded Newton steps on d'(u) / 2 sharpen it.
+    """
+    de, dn = east - peak[0], north - peak[1]
+    radius = np.sqrt(de * de + dn * dn)
+    slope, height, foot = peak[2], peak[3], peak[4]
+    if max(radius - foot, up - height) >= nearer_than:
+        return nearer_than  # its bounding cylinder is farther off already
+    steepness = -1.0 / (slope * slope)
+    level = min(max(up, BASE_HEIGHT_SHARE * height), height)
+    beside = slope * np.sqrt(np.log(height / level))
+    low, high = min(radius, beside), min(max(radius, beside), foot)
+    spacing = (high - low) / PROFILE_SAMPLES
+    best, nearest_u = np.inf, low
+    for i in range(PROFILE_SAMPLES + 1):
+        u = low + i * spacing
+        z = height * np.exp(steepness * u * u)
+        squared = (u - radius) ** 2 + (z - up) ** 2
+        if squared < best:
+            best, nearest_u = squared, u
+    low, high = max(low, nearest_u - spacing), min(high, nearest_u + spacing)
+    u = nearest_u
+    for _ in range(30):
+        z = height * np.exp(steepness * u * u)
+        dz = 2.0 * steepness * u * z
+        ddz = (2.0 * steepness + 4.0 * steepness * steepness * u * u) * z
+        half_slope = (u - radius) + (z - up) * dz
+        if half_slope > 0.0:
+            high = u
+        else:
+            low = u
+        curvature = 1.0 + dz * dz + (z - up) * ddz
+        stepped = u - half_slope / curvature if curvature > 0.0 else low - 1.0
+        stepped = stepped if low <= stepped <= high else 0.5 * (low + high)
+        if abs(stepped - u) < 1e-9 * slope:
+            break
+        u = stepped
+    best = min(best, (u - radius) ** 2 + (height * np.exp(steepness * u * u) - up) ** 2)
+    inside = radius < foot and up < height * np.exp(steepness * radius * radius)
+    return -np.sqrt(best) if inside else np.sqrt(best)
