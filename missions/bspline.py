@@ -62,7 +62,7 @@ def evaluate(control_m: Array, u: Array) -> Array:
 
 
 def uniform_rows(u: Array) -> tuple[Array, Array, Array]:
-    """(m, 4) weights of a uniform segment's four control points for value, first and second derivative by u (eq. 21)."""
+    """(m, 4) weights of a uniform segment's four control points for value, first, second derivative (eq. 21)."""
     u = np.asarray(u, dtype=float)
     zero, one = np.zeros_like(u), np.ones_like(u)
     return (

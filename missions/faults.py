@@ -44,7 +44,7 @@ def parse_fault(text: str) -> Fault:
         CompanionKill(vehicle=1, at_s=4.0)
     """
     kind, _, rest = text.partition(":")
-    fields = dict(part.partition("=")[::2] for part in rest.split(",") if part)
+    fields = {key: value for key, _, value in (part.partition("=") for part in rest.split(",") if part)}
     try:
         return msgspec.convert({"type": kind, **fields}, Fault, strict=False)
     except msgspec.ValidationError as invalid:

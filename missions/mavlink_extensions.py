@@ -9,7 +9,11 @@ import struct
 from typing import Any
 
 EXTENSIONS: dict[str, tuple[tuple[str, str], ...]] = {
-    "MISSION_CURRENT": (("mission_id", "uint32_t"), ("fence_id", "uint32_t"), ("rally_points_id", "uint32_t")),
+    "MISSION_CURRENT": (
+        ("mission_id", "uint32_t"),
+        ("fence_id", "uint32_t"),
+        ("rally_points_id", "uint32_t"),
+    ),
     "MISSION_COUNT": (("opaque_id", "uint32_t"),),
     "MISSION_ACK": (("opaque_id", "uint32_t"),),
 }
@@ -36,7 +40,7 @@ def _extended(base: type, fields: list[tuple[str, str]]) -> type:
     names = [name for name, _ in fields]
     old_names: list[str] = list(base.fieldnames)
 
-    def __init__(self: Any, *values: Any, **named: Any) -> None:
+    def initialise(self: Any, *values: Any, **named: Any) -> None:
         extensions = dict(zip(names, values[len(old_names) :], strict=False))
         extensions |= {name: named.pop(name) for name in names if name in named}
         base.__init__(self, *values[: len(old_names)], **named)
@@ -61,7 +65,7 @@ def _extended(base: type, fields: list[tuple[str, str]]) -> type:
             "array_lengths": base.array_lengths + [0] * len(names),
             "native_format": bytearray(layout.encode()),
             "unpacker": struct.Struct(layout),
-            "__init__": __init__,
+            "__init__": initialise,
             "pack": pack,
         },
     )

@@ -310,7 +310,10 @@ def _misallocated(mission: Mission) -> Iterator[tuple[str, str]]:
     targets = {target.name for target in mission.targets}
     for vehicle, target in mission.allocation.items():
         if vehicle not in vehicles:
-            yield f"allocation.{vehicle}", f"expected one of the vehicles {sorted(vehicles)}, found {vehicle!r}"
+            yield (
+                f"allocation.{vehicle}",
+                f"expected one of the vehicles {sorted(vehicles)}, found {vehicle!r}",
+            )
         if target not in targets:
             yield f"allocation.{vehicle}", f"expected one of the targets {sorted(targets)}, found {target!r}"
     if len(set(mission.allocation.values())) < len(mission.allocation):

@@ -94,9 +94,9 @@ def encode_track(
     for point_m, leg_m_s in zip(track.points_m, track.speeds_m_s, strict=True):
         if abs(leg_m_s - speed_m_s) > 0.01:
             speed_m_s = float(leg_m_s)
-            # param1 1: ground speed; param3 -1: leave the throttle alone
-            change = {"param1": 1.0, "param2": round(speed_m_s, 2), "param3": -1.0}
-            items.append(MissionItem(command=Command.DO_CHANGE_SPEED, **change))
+            # param1 = 1: ground speed; param3 = -1: leave the throttle alone
+            change = MissionItem(command=Command.DO_CHANGE_SPEED, param1=1.0, param2=round(speed_m_s, 2), param3=-1.0)
+            items.append(change)
         items.append(_at(point_m, frame, ground_offset_m, Command.NAV_WAYPOINT, acceptance_radius_m))
     if ending is Command.NAV_LAND:
         ground_m = track.points_m[-1] * np.array([1.0, 1.0, 0.0])
@@ -145,7 +145,11 @@ def _significant(items: Sequence[MissionItem]) -> Iterator[bytes]:
 
 
 def _at(
-    point_m: Array, frame: LocalFrame, ground_offset_m: float, command: Command, acceptance_radius_m: float = 0.0
+    point_m: Array,
+    frame: LocalFrame,
+    ground_offset_m: float,
+    command: Command,
+    acceptance_radius_m: float = 0.0,
 ) -> MissionItem:
     place = frame.geodetic(point_m)
     return MissionItem(

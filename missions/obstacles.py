@@ -74,7 +74,12 @@ def _clearance_of_points(points_enu_m: Array, obstacles: Obstacles) -> Array:
 def clearance_at(east: float, north: float, up: float, obstacles: Obstacles) -> float:
     """`clearance` of one point, to be called from compiled code."""
     nearest = FAR_M
-    boxes, cylinders, threats, peaks = obstacles.boxes, obstacles.cylinders, obstacles.threats, obstacles.peaks
+    boxes, cylinders, threats, peaks = (
+        obstacles.boxes,
+        obstacles.cylinders,
+        obstacles.threats,
+        obstacles.peaks,
+    )
     for i in range(len(boxes)):
         nearest = min(nearest, _to_box(east, north, up, boxes[i]))
     for i in range(len(cylinders)):

@@ -135,7 +135,7 @@ def _refuse_not_finite(source: SourceMap, data: Any, key: str) -> None:
 
 def _real_key(key: str) -> str:
     """`key` up to the `[...]` that msgspec writes for a dictionary's value."""
-    return key.split("[...]")[0]
+    return key.partition("[...]")[0]
 
 
 def _lookup(data: Any, key: str) -> Any:
