@@ -1,6 +1,6 @@
 """Distances to everything solid or forbidden in a world: packed arrays, and compiled functions over them.
 
-`clearance` is the distance lambda of the paper (eqs. 3 and 13): from a point to the nearest surface of a threat, a peak's
+`clearance` is the distance lambda of the paper (eqs. 3, 13): from a point to the nearest surface of a threat, a peak's
 body or an obstacle, flat ground excluded, negative inside. `terrain_height` is the ground of eq. 23.
 """
 
