@@ -20,6 +20,8 @@ from missions.frames import LocalFrame
 
 Array = npt.NDArray[np.float64]
 
+MAV_FRAME_MISSION = 2
+"""The frame of items without a place; PX4 refuses a mission that has them in any other."""
 MAV_FRAME_GLOBAL_INT = 5
 DEG_E7 = 1e7
 
@@ -95,14 +97,21 @@ def encode_track(
         if abs(leg_m_s - speed_m_s) > 0.01:
             speed_m_s = float(leg_m_s)
             # param1 = 1: ground speed; param3 = -1: leave the throttle alone
-            change = MissionItem(command=Command.DO_CHANGE_SPEED, param1=1.0, param2=round(speed_m_s, 2), param3=-1.0)
-            items.append(change)
+            items.append(
+                MissionItem(
+                    command=Command.DO_CHANGE_SPEED,
+                    frame=MAV_FRAME_MISSION,
+                    param1=1.0,
+                    param2=round(speed_m_s, 2),
+                    param3=-1.0,
+                )
+            )
         items.append(_at(point_m, frame, ground_offset_m, Command.NAV_WAYPOINT, acceptance_radius_m))
     if ending is Command.NAV_LAND:
         ground_m = track.points_m[-1] * np.array([1.0, 1.0, 0.0])
         items.append(_at(ground_m, frame, ground_offset_m, Command.NAV_LAND))
     elif ending is Command.NAV_RETURN_TO_LAUNCH:
-        items.append(MissionItem(command=Command.NAV_RETURN_TO_LAUNCH))
+        items.append(MissionItem(command=Command.NAV_RETURN_TO_LAUNCH, frame=MAV_FRAME_MISSION))
     return tuple(items)
 
 
