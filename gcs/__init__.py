@@ -1,1 +1,14 @@
-"""TBD."""
+"""The ground station: cloud planner, MAVLink link, fleet state, flight sequence, reports, web page, CLI `gcs`.
+
+Layers, each importing only what stands below it:
+
+    cli             commands and their help
+    app             composition root: builds the parts, runs them in one TaskGroup
+    view            the viser page: reads state, emits the operator's intents
+    flight          the flight sequence, its checks, monitor and reports
+    station         all vehicles on all links: routes messages to services and state
+    microservices   sans-IO MAVLink services (commands, missions, parameters)
+    link, fleet     datagrams and recordings; telemetry folded into state
+    planner         E-CPSO, target allocation, the plan's judge
+    dialect         pymavlink as codec
+"""

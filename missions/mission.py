@@ -36,6 +36,11 @@ class Site(Enum):
         return 1.0 if self is Site.INDOOR else 5.0
 
     @property
+    def arrival_tolerance_m(self) -> float:
+        """How near to its target a vehicle has reached it."""
+        return 0.5 if self is Site.INDOOR else 2.0
+
+    @property
     def fence_margin_m(self) -> float:
         """How far beyond the flight range the geofence lies."""
         return 1.0 if self is Site.INDOOR else 5.0

@@ -1,0 +1,5 @@
+"""`python -m gcs` is the console script `gcs`."""
+
+from gcs.cli import main
+
+main()

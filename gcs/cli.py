@@ -1,0 +1,235 @@
+"""The command line of the ground station: `gcs fly`, `gcs plan`, `gcs check`, `gcs watch`."""
+
+import asyncio
+import contextlib
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from gcs import settings as chosen
+from gcs.errors import GcsError, UsageError
+from gcs.link.url import parse_link_url
+from missions.errors import MissionError
+from missions.faults import EXAMPLES as FAULT_EXAMPLES
+from missions.faults import parse_fault
+from missions.frames import GeodeticPoint
+from missions.mission import Mission, load_mission, shipped_missions
+
+BAD_INPUT = 2
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    help="A MAVLink ground control station for small UAV fleets.",
+)
+
+MissionArgument = Annotated[str, typer.Argument(metavar="MISSION", help="a mission file, or a shipped mission's name")]
+LinkOption = Annotated[
+    list[str] | None, typer.Option("--link", metavar="URL", help="udpin://HOST:PORT or udpout://HOST:PORT; repeatable")
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="of planner and simulator: one seed, one plan")]
+InstanceOption = Annotated[int, typer.Option("--instance-base", min=0, max=10_000, help="shifts all ports")]
+
+
+@app.command()
+def fly(
+    mission: MissionArgument,
+    sim: Annotated[bool, typer.Option("--sim", help="start the simulator and one companion per vehicle")] = False,
+    companions: Annotated[bool, typer.Option("--companions", help="start the companions alone")] = False,
+    mode: Annotated[chosen.PlanningMode, typer.Option(help="who plans")] = chosen.PlanningMode.END_CLOUD,
+    headless: Annotated[bool, typer.Option("--headless", help="no web page; end when the flight has ended")] = False,
+    speed: Annotated[float, typer.Option(min=0.1, max=100.0, help="simulated seconds per second")] = 1.0,
+    seed: SeedOption = 0,
+    link: LinkOption = None,
+    origin: Annotated[
+        str | None, typer.Option(metavar="LAT,LON,ALT|here", help="where on earth the mission is flown")
+    ] = None,
+    report: Annotated[Path | None, typer.Option(metavar="DIR", help="where report, logs and picture go")] = None,
+    host: Annotated[str, typer.Option(help="address of the web page; loopback only")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
+    fault: Annotated[
+        list[str] | None, typer.Option(metavar="SPEC", help=f"something that goes wrong, such as {FAULT_EXAMPLES[0]}")
+    ] = None,
+    instance_base: InstanceOption = 0,
+) -> None:
+    """Fly a mission.
+
+    Examples:
+
+        gcs fly indoor --sim                                  on the bundled simulator, with the web page
+
+        gcs fly indoor --sim --headless --speed 5 --report out
+
+        gcs fly field --companions --origin here --link udpin://0.0.0.0:14550     on a real PX4
+
+    Exit codes: 0 every vehicle reached its target safely, 1 it did not (the report says why), 2 bad input.
+    """
+    if sim and companions:
+        raise UsageError("--sim starts the companions already: give one of --sim and --companions")
+    if host not in {"127.0.0.1", "localhost", "::1"}:
+        raise UsageError(f"--host {host}: the page is served on loopback only")
+    sources = {(True, False): chosen.Fleet.SIMULATED, (False, True): chosen.Fleet.COMPANIONS}
+    settings = chosen.FlightSettings(
+        mission=mission,
+        mode=mode,
+        fleet=sources.get((sim, companions), chosen.Fleet.ATTACHED),
+        headless=headless,
+        speed=speed,
+        seed=seed,
+        links=tuple(parse_link_url(text) for text in link or ()),
+        origin=_origin(origin),
+        report_dir=report,
+        host=host,
+        port=port,
+        faults=tuple(parse_fault(text) for text in fault or ()),
+        instance_base=instance_base,
+    )
+    raise typer.Exit(_run_flight(settings, load_mission(mission)))
+
+
+@app.command()
+def plan(
+    mission: MissionArgument,
+    algorithm: Annotated[str, typer.Option(help="the planner")] = "ecpso",
+    seed: SeedOption = 0,
+    evaluations: Annotated[int | None, typer.Option(min=1, help="stop after so many evaluations")] = None,
+    budget_s: Annotated[float | None, typer.Option("--budget-s", min=0.001, help="stop after so much time")] = None,
+    output: Annotated[Path | None, typer.Option(metavar="FILE", help="where the plan goes, as .json")] = None,
+) -> None:
+    """Plan a mission and say what came out; nothing is sent to any vehicle.
+
+    Example:
+
+        gcs plan terrain-1-5uav --seed 3 --output plan.json
+    """
+    if output is not None and output.suffix != ".json":
+        raise UsageError(f"--output {output}: expected a name that ends in .json")
+    from rich.console import Console
+
+    from gcs.console import PlanConsole, print_plan
+    from gcs.planner import plan_mission
+
+    loaded, console = load_mission(mission), Console(highlight=False, soft_wrap=True)
+    with PlanConsole(console) as progress:
+        found = plan_mission(
+            loaded,
+            algorithm=algorithm,
+            seed=seed,
+            evaluations=evaluations,
+            budget_s=budget_s,
+            on_progress=progress.show,
+        )
+    print_plan(console, found)
+    if output is not None:
+        _write(output, found.to_json())
+    raise typer.Exit(0 if found.feasible else 1)
+
+
+@app.command()
+def check(mission: MissionArgument) -> None:
+    """Check a mission file and say what is in it."""
+    loaded = load_mission(mission)
+    world, bounds = loaded.world, loaded.world.bounds
+    size_m = bounds.high_enu_m - bounds.low_enu_m
+    print(f"{loaded.name}: {loaded.description}")
+    print(f"  site      {loaded.site.value}, {size_m[0]:g} x {size_m[1]:g} x {size_m[2]:g} m")
+    for kind in ("peaks", "threats", "boxes", "cylinders", "movers"):
+        things = getattr(world, kind)
+        if things:
+            names = (thing.name + ("" if thing.known else " (unmapped)") for thing in things)
+            print(f"  {kind:9} {', '.join(names)}")
+    for vehicle in loaded.vehicles:
+        target = (loaded.allocation or {}).get(vehicle.name, "allocated by the planner")
+        print(f"  vehicle   {vehicle.name} (system {vehicle.sysid}) from {list(vehicle.pad_m)} to {target}")
+    print(f"  arrival   {loaded.on_arrival.value}")
+
+
+@app.command()
+def missions() -> None:
+    """List the shipped missions."""
+    for name in shipped_missions():
+        print(f"{name:20} {load_mission(name).description}")
+
+
+def main() -> None:
+    """Entry point of the console script: errors become a sentence and an exit code."""
+    signal.signal(signal.SIGTERM, _as_interrupt)
+    try:
+        app(standalone_mode=True)
+    except (UsageError, MissionError) as problem:
+        print(f"gcs: {problem}", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+    except GcsError as problem:
+        print(f"gcs: {problem}", file=sys.stderr)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
+    from gcs.app import FlightApp
+    from gcs.console import FlightConsole, PlanConsole
+    from gcs.flight.events import EventLog
+    from gcs.planner_process import PlannerProcess
+
+    if isinstance(settings.origin, GeodeticPoint):
+        mission = mission.moved_to(settings.origin)
+    console = FlightConsole()
+    with _work_dir(settings.report_dir) as work_dir, PlanConsole(console.console) as progress:
+        events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
+        with PlannerProcess("ecpso", settings.seed, progress.show) as planner:
+            flight = FlightApp(settings, mission, planner.plan, events, work_dir)
+            report = asyncio.run(flight.fly())
+        events.close()
+    verdict = "success" if report.success else "FAILED"
+    console.say(f"{verdict}: {report.reason}", style="green" if report.success else "bold red")
+    if settings.report_dir is not None:
+        console.say(f"report: {settings.report_dir / 'report.json'}")
+    return 0 if report.success else 1
+
+
+@contextlib.contextmanager
+def _work_dir(report_dir: Path | None) -> Iterator[Path]:
+    """The report's directory, or one that is thrown away."""
+    if report_dir is None:
+        with tempfile.TemporaryDirectory(prefix="gcs-") as scratch:
+            yield Path(scratch)
+        return
+    try:
+        report_dir.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise UsageError(f"--report {report_dir}: cannot be made: {problem.strerror}") from None
+    yield report_dir
+
+
+def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
+    if text is None:
+        return None
+    if text == "here":
+        return chosen.OriginHere.HERE
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+        fields = {"latitude_deg": latitude, "longitude_deg": longitude, "altitude_amsl_m": altitude}
+        return msgspec.convert(fields, GeodeticPoint)
+    except (ValueError, msgspec.ValidationError) as problem:
+        raise UsageError(f"--origin {text}: expected LAT,LON,ALT or `here`: {problem}") from None
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text)
+    except OSError as problem:
+        raise UsageError(f"--output {path}: cannot be written: {problem.strerror}") from None
+
+
+def _as_interrupt(*_: object) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,37 @@
+"""What can go wrong in the ground station; each error carries a sentence for the operator."""
+
+
+class GcsError(Exception):
+    """Base of the ground station's errors."""
+
+
+class UsageError(GcsError):
+    """The operator asked for something that cannot be: exit code 2, nothing was sent."""
+
+
+class LinkLost(GcsError):
+    """No answer, in spite of repeated requests."""
+
+
+class CommandRefused(GcsError):
+    """An autopilot or companion refused a command."""
+
+
+class MissionTransferError(GcsError):
+    """A mission or fence could not be stored, or what is stored is not what was sent."""
+
+
+class ParameterError(GcsError):
+    """A parameter could not be read or set."""
+
+
+class PreflightError(GcsError):
+    """A vehicle is not fit for the flight; nothing was armed."""
+
+
+class FlightAborted(GcsError):
+    """The flight ended before every vehicle was at its target."""
+
+
+class ProcessFailed(GcsError):
+    """A program that this one started has ended by itself."""

@@ -1,0 +1,1 @@
+"""What is known of every vehicle: telemetry folded into state. No socket, no clock."""

@@ -1,0 +1,1 @@
+"""One flight of a fleet, from the first heartbeat to the report."""

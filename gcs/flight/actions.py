@@ -1,0 +1,40 @@
+"""The commands of a flight, built so that a repeated copy changes nothing."""
+
+from gcs.dialect import Mode, mavlink
+from gcs.microservices.command_client import NAN, Command
+
+CUSTOM_MODE_ENABLED = 1.0
+
+
+def arm() -> Command:
+    return Command("arm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,))
+
+
+def disarm() -> Command:
+    """Refused by the autopilot while it flies."""
+    return Command("disarm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (0.0,))
+
+
+def take_off(altitude_amsl_m: float) -> Command:
+    """Climb from where it stands to an altitude AMSL, and hold there."""
+    return Command("take off", mavlink.MAV_CMD_NAV_TAKEOFF, (NAN, NAN, NAN, NAN, NAN, NAN, altitude_amsl_m))
+
+
+def set_mode(mode: Mode) -> Command:
+    """One of PX4's modes; hold, return and land are commanded so."""
+    params = (CUSTOM_MODE_ENABLED, float(mode.main), float(mode.sub))
+    return Command(mode.name.lower(), mavlink.MAV_CMD_DO_SET_MODE, params)
+
+
+def start_mission() -> Command:
+    """To a companion: take control and fly; to an autopilot: fly the stored mission."""
+    return Command("start the mission", mavlink.MAV_CMD_MISSION_START)
+
+
+def request_message(message_id: int) -> Command:
+    return Command("request a message", mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id),))
+
+
+def set_message_interval(message_id: int, rate_hz: float) -> Command:
+    params = (float(message_id), 1e6 / rate_hz)
+    return Command("set a message interval", mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, params)

@@ -1,0 +1,63 @@
+"""What happened in a flight: decisions, commands and what the vehicles said, in order and with times."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Any, TextIO
+
+import msgspec
+
+
+class Severity(Enum):
+    """How much an event matters to an operator."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class Event(msgspec.Struct, frozen=True, kw_only=True):
+    """One line of the event log."""
+
+    t_s: float
+    """Since the start of the program [s, wall clock]."""
+    vehicle: str | None
+    kind: str
+    text: str
+    severity: Severity = Severity.INFO
+    data: dict[str, Any] = {}
+
+
+@dataclass
+class EventLog:
+    """Keeps events, writes them as JSON lines, and tells listeners.
+
+    Args:
+        clock: seconds on a monotonic clock.
+        path: where the JSON lines go, or None.
+    """
+
+    clock: Callable[[], float]
+    path: Path | None = None
+    events: list[Event] = field(default_factory=list)
+    listeners: list[Callable[[Event], None]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._started_s = self.clock()
+        self._file: TextIO | None = self.path.open("w", buffering=1) if self.path else None
+
+    def add(
+        self, kind: str, text: str, vehicle: str | None = None, severity: Severity = Severity.INFO, **data: Any
+    ) -> None:
+        t_s = round(self.clock() - self._started_s, 3)
+        event = Event(t_s=t_s, vehicle=vehicle, kind=kind, text=text, severity=severity, data=data)
+        self.events.append(event)
+        if self._file is not None:
+            self._file.write(msgspec.json.encode(event).decode() + "\n")
+        for listener in self.listeners:
+            listener(event)
+
+    def close(self) -> None:
+        if self._file is not None:
+            self._file.close()

@@ -1,0 +1,186 @@
+"""Watching one vehicle in flight: what phase it is in, when it has arrived, and when the ground must step in.
+
+Sans-IO: `VehicleMonitor.step` is given the vehicle's state and the time, and returns the mode to be commanded, if any.
+The companion's own status is believed while its heartbeat is fresh; without it the autopilot's mode decides.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from gcs.dialect import Mode
+from gcs.fleet.vehicle_state import LandedState, VehicleState
+from missions.frames import LocalFrame
+from missions.mission import OnArrival, Target
+from missions.tunnel import CompanionState, Reason
+
+COMPANION_SILENCE_S = 1.5
+"""Wall-clock age of a companion's heartbeat after which the ground takes over [s]."""
+
+TAKEOVER_GRACE_S = 3.0
+"""How long after the start a mode may lag behind the truth: HEARTBEAT shows it up to 1 s late [s]."""
+
+UNATTENDED_HOLD_S = 5.0
+"""With nobody at the page, an interrupted vehicle holds for so long and is then landed [s]."""
+
+IN_CONTROL = {CompanionState.ENGAGING, CompanionState.FLYING, CompanionState.LANDING}
+CLOUD_MODES = {Mode.MISSION, Mode.LAND, Mode.RTL, Mode.TAKEOFF}
+
+
+class Phase(Enum):
+    """Where a vehicle is in its flight."""
+
+    WAITING = "waiting"
+    PREPARED = "prepared"
+    TAKING_OFF = "taking off"
+    HOVERING = "hovering"
+    FLYING = "flying"
+    INTERRUPTED = "interrupted"
+    """Holding, because somebody or something ended the companion's control."""
+    COMING_DOWN = "coming down"
+    """On the ground's order, away from the target or after an interruption."""
+    DONE = "done"
+
+    @property
+    def in_flight(self) -> bool:
+        return self in {Phase.TAKING_OFF, Phase.HOVERING, Phase.FLYING, Phase.INTERRUPTED, Phase.COMING_DOWN}
+
+
+@dataclass
+class VehicleMonitor:
+    """One vehicle's flight from the start of its mission on.
+
+    Args:
+        target: where it shall arrive.
+        on_arrival: what it does there.
+        tolerance_m: how near to the target counts as reached.
+        endurance_s: longest flight, in vehicle time.
+        flown_by_companion: False in cloud mode, where the autopilot flies the mission itself.
+        unattended: nobody is there to resume an interrupted flight, so it is ended by landing.
+        speed: simulated seconds per wall-clock second.
+    """
+
+    target: Target
+    on_arrival: OnArrival
+    tolerance_m: float
+    endurance_s: float
+    flown_by_companion: bool
+    unattended: bool
+    frame: LocalFrame
+    ground_offset_m: float
+    speed: float = 1.0
+    phase: Phase = Phase.WAITING
+    reached: bool = False
+    reason: str = ""
+    paused_by_operator: bool = False
+    offboard_losses: int = 0
+    started_s: float = 0.0
+    """Vehicle time of the start."""
+    _started_wall_s: float = 0.0
+    _interrupted_wall_s: float = 0.0
+    _was_at_target: bool = False
+
+    def start(self, state: VehicleState, now_s: float) -> None:
+        """The mission has been started (or resumed) on this vehicle."""
+        if self.phase is not Phase.INTERRUPTED:
+            self.started_s = state.vehicle_time_s(now_s, self.speed)
+        self.phase, self.reason, self.paused_by_operator = Phase.FLYING, "", False
+        self._started_wall_s = now_s
+
+    def step(self, state: VehicleState, now_s: float) -> Mode | None:
+        """Look at the vehicle; the mode that the ground has to command now, or None."""
+        if self.phase in {Phase.FLYING, Phase.INTERRUPTED, Phase.COMING_DOWN} and self._down(state):
+            return self._finish(state)
+        match self.phase:
+            case Phase.FLYING:
+                return self._flying(state, now_s)
+            case Phase.INTERRUPTED:
+                return self._interrupted(state, now_s)
+            case _:
+                return None
+
+    def come_down(self, reason: str) -> None:
+        """The ground has ordered a landing or a return."""
+        self.phase, self.reason = Phase.COMING_DOWN, self.reason or reason
+
+    def give_up(self, reason: str) -> None:
+        """The flight is over for this vehicle, wherever it is."""
+        self.phase, self.reason = Phase.DONE, self.reason or reason
+
+    def distance_to_target_m(self, state: VehicleState, *, horizontal: bool = False) -> float:
+        """Distance [m] from where the vehicle says it is; infinite before it says anything."""
+        position_m = state.position_m(self.frame, self.ground_offset_m)
+        if position_m is None:
+            return np.inf
+        axes = 2 if horizontal else 3
+        return float(np.linalg.norm((position_m - np.array(self.target.position_m))[:axes]))
+
+    def _flying(self, state: VehicleState, now_s: float) -> Mode | None:
+        if state.vehicle_time_s(now_s, self.speed) - self.started_s > self.endurance_s:
+            self.come_down(f"not at its target after {self.endurance_s:g} s, its endurance")
+            return Mode.LAND
+        self._was_at_target = self._was_at_target or self.distance_to_target_m(state) <= self.tolerance_m
+        if self._holds_at_target(state):
+            self.reached, self.phase, self.reason = True, Phase.DONE, "holding at its target"
+            return None
+        return self._companion_flight(state, now_s) if self.flown_by_companion else self._cloud_flight(state, now_s)
+
+    def _companion_flight(self, state: VehicleState, now_s: float) -> Mode | None:
+        if not state.companion_online(now_s, COMPANION_SILENCE_S) and state.online(now_s):
+            self._interrupt("the companion fell silent", now_s)
+            return Mode.HOLD if state.mode is Mode.OFFBOARD else None
+        if now_s - self._started_wall_s < TAKEOVER_GRACE_S:
+            return None
+        status = state.companion.status
+        if status is not None and status.state not in IN_CONTROL | {CompanionState.HOLDING, CompanionState.FINISHED}:
+            self._interrupt(f"the companion is {describe(status.state, status.reason)}", now_s)
+        return None
+
+    def _cloud_flight(self, state: VehicleState, now_s: float) -> Mode | None:
+        if now_s - self._started_wall_s > TAKEOVER_GRACE_S and state.mode not in CLOUD_MODES:
+            self._interrupt(f"the autopilot left its mission for {state.mode.name}", now_s)
+        return None
+
+    def _interrupt(self, reason: str, now_s: float) -> None:
+        self.phase, self._interrupted_wall_s = Phase.INTERRUPTED, now_s
+        self.reason = "paused by the operator" if self.paused_by_operator else reason
+        if not self.paused_by_operator:
+            self.offboard_losses += 1
+
+    def _interrupted(self, state: VehicleState, now_s: float) -> Mode | None:
+        status = state.companion.status
+        if state.companion_online(now_s, COMPANION_SILENCE_S) and status and status.state in IN_CONTROL:
+            self.phase, self.reason = Phase.FLYING, ""  # a heartbeat was late, or another station resumed the flight
+            return None
+        overdue = now_s - self._interrupted_wall_s > UNATTENDED_HOLD_S
+        if self.unattended and overdue and state.mode in {Mode.HOLD, Mode.OFFBOARD}:  # never against a pilot's mode
+            self.phase = Phase.COMING_DOWN
+            return Mode.LAND
+        return None
+
+    def _holds_at_target(self, state: VehicleState) -> bool:
+        if self.on_arrival is not OnArrival.HOLD or self.distance_to_target_m(state) > self.tolerance_m:
+            return False
+        if not self.flown_by_companion:
+            return state.mode is Mode.HOLD
+        status = state.companion.status
+        return status is not None and (status.state, status.reason) == (CompanionState.HOLDING, Reason.TARGET_REACHED)
+
+    def _down(self, state: VehicleState) -> bool:
+        return state.landed is LandedState.ON_GROUND and not state.armed
+
+    def _finish(self, state: VehicleState) -> None:
+        missed_m = self.distance_to_target_m(state, horizontal=True)
+        at_home = self.on_arrival is OnArrival.RTL and self._was_at_target
+        self.reached = self.phase is Phase.FLYING and (missed_m <= self.tolerance_m or at_home)
+        if self.phase is Phase.FLYING and not self.reached:
+            self.reason = f"landed {missed_m:.1f} m from its target"
+        self.phase = Phase.DONE
+        self.reason = self.reason or ("landed at its target" if self.reached else "landed")
+
+
+def describe(state: CompanionState, reason: Reason) -> str:
+    """A companion's state in words."""
+    words = state.name.lower()
+    return words if reason is Reason.NONE else f"{words} ({reason.name.lower().replace('_', ' ')})"

@@ -1,0 +1,75 @@
+"""The command protocol, the ground station's side: send, repeat until acknowledged, and say how it ended.
+
+A PX4 executes every copy of a repeated command, so only commands are sent whose repetition changes nothing.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from gcs.dialect import Message, enum_name, mavlink
+from gcs.errors import CommandRefused, LinkLost
+from gcs.microservices import Backoff
+
+FIRST_TIMEOUT_S = 0.5
+ATTEMPTS = 10
+PROGRESS_TIMEOUT_S = 30.0
+"""Patience once the other side has said that it is at work."""
+
+NAN = math.nan
+
+
+@dataclass(frozen=True)
+class Command:
+    """One COMMAND_LONG: its number, parameters 1 to 7, and what an operator calls it."""
+
+    name: str
+    number: int
+    params: tuple[float, ...] = ()
+
+    def message(self, peer: tuple[int, int], confirmation: int) -> Message:
+        params = (*self.params, *(0.0,) * (7 - len(self.params)))
+        return mavlink.MAVLink_command_long_message(*peer, self.number, confirmation, *params)
+
+
+@dataclass
+class CommandClient:
+    """One command to one component.
+
+    Raises:
+        CommandRefused: the other side answered anything but ACCEPTED.
+        LinkLost: it did not answer at all.
+    """
+
+    command: Command
+    peer: tuple[int, int]
+    done: bool = False
+    deadline_s: float = math.inf
+    wants: frozenset[str] = frozenset({"COMMAND_ACK"})
+    _confirmation: int = 0
+    _backoff: Backoff = field(default_factory=lambda: Backoff(FIRST_TIMEOUT_S, ATTEMPTS))
+
+    def start(self, now_s: float) -> list[Message]:
+        self.deadline_s = now_s + self._backoff.take()
+        return [self.command.message(self.peer, self._confirmation)]
+
+    def receive(self, message: Message, now_s: float) -> list[Message]:
+        if message.command != self.command.number or self.done:
+            return []
+        if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
+            self.deadline_s = now_s + PROGRESS_TIMEOUT_S
+            return []
+        self.done = True
+        if message.result != mavlink.MAV_RESULT_ACCEPTED:
+            result = enum_name("MAV_RESULT", message.result).removeprefix("MAV_RESULT_")
+            raise CommandRefused(f"{self}: {result}")
+        return []
+
+    def handle_timeout(self, now_s: float) -> list[Message]:
+        if self._backoff.exhausted:
+            self.done = True
+            raise LinkLost(f"{self}: no answer to {self._confirmation + 1} requests")
+        self._confirmation = min(self._confirmation + 1, 255)
+        return self.start(now_s)
+
+    def __str__(self) -> str:
+        return f"vehicle {self.peer[0]}: {self.command.name}"

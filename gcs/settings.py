@@ -1,0 +1,64 @@
+"""What an operator chooses for one flight."""
+
+from enum import Enum
+from pathlib import Path
+
+import msgspec
+
+from gcs.link.url import LinkUrl, Scheme
+from missions.faults import Fault
+from missions.frames import GeodeticPoint
+
+
+class PlanningMode(Enum):
+    """Who plans the flight; comparing the three is the paper's claim."""
+
+    END_CLOUD = "end-cloud"
+    """Cloud track points, flown by the companions, which plan locally."""
+    CLOUD = "cloud"
+    """The autopilot flies the cloud's mission; no companion."""
+    ONBOARD = "onboard"
+    """The companions plan everything; the mission holds the target alone."""
+
+    @property
+    def needs_companions(self) -> bool:
+        return self is not PlanningMode.CLOUD
+
+
+class Fleet(Enum):
+    """Which programs the ground station starts itself."""
+
+    SIMULATED = "simulated"
+    """The simulator and one companion per vehicle."""
+    COMPANIONS = "companions"
+    """The companions; the autopilots are there already."""
+    ATTACHED = "attached"
+    """Nothing: everything is running."""
+
+
+class OriginHere(Enum):
+    """The wish to move the mission to where the vehicles stand."""
+
+    HERE = "here"
+
+
+class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """One `gcs fly`, as the command line states it."""
+
+    mission: str
+    mode: PlanningMode = PlanningMode.END_CLOUD
+    fleet: Fleet = Fleet.ATTACHED
+    headless: bool = False
+    speed: float = 1.0
+    seed: int = 0
+    links: tuple[LinkUrl, ...] = ()
+    origin: GeodeticPoint | OriginHere | None = None
+    report_dir: Path | None = None
+    host: str = "127.0.0.1"
+    port: int = 8080
+    faults: tuple[Fault, ...] = ()
+    instance_base: int = 0
+
+    def ground_links(self) -> tuple[LinkUrl, ...]:
+        """The links that were asked for, or the usual port on loopback."""
+        return self.links or (LinkUrl(Scheme.UDP_IN, "127.0.0.1", 14550 + self.instance_base),)
