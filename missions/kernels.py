@@ -17,10 +17,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 def compiled(function: F) -> F:
     """Compile `function` with numba at its first call and keep the machine code beside its source.
 
+    Compiled code runs without the interpreter lock: other threads go on meanwhile.
+
     The type of the function is kept, so that type checkers see through it. Every compiled function has a
     readable numpy reference in the tests or beside it, and a test that holds the two equal.
     """
-    return cast(F, njit(cache=True)(function))
+    return cast(F, njit(cache=True, nogil=True)(function))
 
 
 def inlined(function: F) -> F:
