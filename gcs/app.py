@@ -17,8 +17,8 @@ from gcs.flight.trails import Trails
 from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
-from gcs.settings import FlightSettings, OriginHere
 from gcs.settings import Fleet as FleetSource
+from gcs.settings import FlightSettings, OriginHere
 from gcs.station import Station
 from missions.faults import format_fault
 from missions.frames import GeodeticPoint

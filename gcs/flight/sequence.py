@@ -228,8 +228,15 @@ class FleetFlight:
                 lambda: fleet[sysid].companion_online(self.station.now_s), CONNECT_TIMEOUT_S, what
             )
             self.events.add("companion", "companion heard", vehicle.name)
+        await self._request_streams(vehicle)
+
+    async def _request_streams(self, vehicle: Vehicle) -> None:
         for message_id, rate_hz in STREAM_RATES_HZ.items():
-            await self._command_to(sysid, AUTOPILOT, actions.set_message_interval(message_id, rate_hz))
+            try:
+                await self._command_to(vehicle.sysid, AUTOPILOT, actions.set_message_interval(message_id, rate_hz))
+            except CommandRefused:  # a PX4 sends MISSION_CURRENT at its own rate alone
+                name = mavlink.mavlink_map[message_id].msgname
+                self.events.add("stream", f"the autopilot keeps its own rate of {name}", vehicle.name)
 
     async def _prepare(self, flight: VehicleFlight) -> None:
         await self._ready_to_arm(flight)

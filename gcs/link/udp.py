@@ -3,6 +3,7 @@
 import asyncio
 import socket
 from collections.abc import Callable
+from typing import cast
 
 from gcs.errors import UsageError
 from gcs.link.url import LinkUrl, Scheme
@@ -25,8 +26,7 @@ class UdpConnection(asyncio.DatagramProtocol):
         self._transport: asyncio.DatagramTransport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.DatagramTransport)
-        self._transport = transport
+        self._transport = cast(asyncio.DatagramTransport, transport)  # asyncio's own class does not derive from it
 
     def datagram_received(self, data: bytes, addr: Address) -> None:
         self._receiver(self, data, (addr[0], addr[1]))
