@@ -23,6 +23,9 @@ PREARM_BIT = 0x10000000
 LINK_TIMEOUT_S = 3.0
 """A vehicle unheard for so long is shown as lost."""
 
+LINK_GAP_S = 0.5
+"""A pause in a vehicle's telemetry longer than this is a gap in the link: nothing said in it was to be heard."""
+
 TEXTS_KEPT = 50
 
 
@@ -54,6 +57,7 @@ class CompanionView:
     """What is known of a vehicle's companion."""
 
     heard_s: float = -math.inf
+    """Last message of any kind."""
     status: tunnel.CompanionStatus | None = None
     trajectory: Trajectory | None = None
     """The trajectory that it flies; its `start_s` is UTC [s]."""
@@ -67,6 +71,10 @@ class VehicleState:
     sysid: int
     heard_s: float = -math.inf
     """Last heartbeat of the autopilot."""
+    telemetry_s: float = -math.inf
+    """Last message of any kind from the autopilot."""
+    link_since_s: float = -math.inf
+    """Since when telemetry has been coming in without a gap."""
     armed: bool = False
     mode: Mode = Mode.UNKNOWN
     failsafe: bool = False
@@ -93,6 +101,9 @@ class VehicleState:
         if message.get_srcComponent() == COMPANION:
             self._fold_companion(message, now_s)
         elif message.get_srcComponent() == AUTOPILOT:
+            if now_s - self.telemetry_s > LINK_GAP_S:
+                self.link_since_s = now_s
+            self.telemetry_s = now_s
             handler = _HANDLERS.get(message.get_type())
             if handler is not None:
                 handler(self, message, now_s)
@@ -100,8 +111,14 @@ class VehicleState:
     def online(self, now_s: float) -> bool:
         return now_s - self.heard_s < LINK_TIMEOUT_S
 
-    def companion_online(self, now_s: float, within_s: float = LINK_TIMEOUT_S) -> bool:
-        return now_s - self.companion.heard_s < within_s
+    def companion_online(self, now_s: float) -> bool:
+        return now_s - self.companion.heard_s < LINK_TIMEOUT_S
+
+    def companion_silence_s(self, now_s: float) -> float:
+        """For how long the companion has said nothing although the link carried; 0 while the link itself is down."""
+        if now_s - self.telemetry_s > LINK_GAP_S:
+            return 0.0
+        return now_s - max(self.companion.heard_s, self.link_since_s)
 
     def vehicle_time_s(self, now_s: float, speed: float) -> float:
         """The vehicle's clock now: as it last said, and gone on since at `speed` times the wall clock."""
@@ -119,14 +136,12 @@ class VehicleState:
         return self.armed and self.landed not in {LandedState.ON_GROUND, LandedState.UNDEFINED}
 
     def _fold_companion(self, message: Message, now_s: float) -> None:
-        match message.get_type():
-            case "HEARTBEAT":
-                self.companion.heard_s = now_s
-            case "TUNNEL":
-                try:
-                    self._fold_tunnel(message)
-                except WireFormatError:
-                    self.undecodable += 1
+        self.companion.heard_s = now_s
+        if message.get_type() == "TUNNEL":
+            try:
+                self._fold_tunnel(message)
+            except WireFormatError:
+                self.undecodable += 1
 
     def _fold_tunnel(self, message: Message) -> None:
         payload = bytes(message.payload[: message.payload_length])

@@ -16,7 +16,7 @@ from missions.mission import OnArrival, Target
 from missions.tunnel import CompanionState, Reason
 
 COMPANION_SILENCE_S = 1.5
-"""Wall-clock age of a companion's heartbeat after which the ground takes over [s]."""
+"""A companion that says nothing for so long, on a link that carries, is taken for dead [s, wall clock]."""
 
 TAKEOVER_GRACE_S = 3.0
 """How long after the start a mode may lag behind the truth: HEARTBEAT shows it up to 1 s late [s]."""
@@ -127,7 +127,7 @@ class VehicleMonitor:
         return self._companion_flight(state, now_s) if self.flown_by_companion else self._cloud_flight(state, now_s)
 
     def _companion_flight(self, state: VehicleState, now_s: float) -> Mode | None:
-        if not state.companion_online(now_s, COMPANION_SILENCE_S) and state.online(now_s):
+        if state.companion_silence_s(now_s) > COMPANION_SILENCE_S:
             self._interrupt("the companion fell silent", now_s)
             return Mode.HOLD if state.mode is Mode.OFFBOARD else None
         if now_s - self._started_wall_s < TAKEOVER_GRACE_S:
@@ -150,7 +150,8 @@ class VehicleMonitor:
 
     def _interrupted(self, state: VehicleState, now_s: float) -> Mode | None:
         status = state.companion.status
-        if state.companion_online(now_s, COMPANION_SILENCE_S) and status and status.state in IN_CONTROL:
+        alive = now_s - state.companion.heard_s < COMPANION_SILENCE_S
+        if alive and status is not None and status.state in IN_CONTROL:
             self.phase, self.reason = Phase.FLYING, ""  # a heartbeat was late, or another station resumed the flight
             return None
         overdue = now_s - self._interrupted_wall_s > UNATTENDED_HOLD_S

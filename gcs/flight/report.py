@@ -8,11 +8,14 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from gcs.dialect import AUTOPILOT
 from gcs.flight.sequence import FleetFlight, VehicleFlight
 from gcs.flight.trails import Trail
+from gcs.link.codec import SourceCount
 from missions import obstacles
 from missions.mission import Mission
 from missions.time_law import arc_length
+from missions.tunnel import CompanionState, CompanionStatus
 
 Array = npt.NDArray[np.float64]
 
@@ -152,11 +155,10 @@ def min_separation_m(flown: Sequence[Flown]) -> float | None:
 
 def _vehicle_report(flight: FleetFlight, part: VehicleFlight, flown: Flown | None) -> VehicleReport:
     state = flight.state(part.sysid)
-    status = state.companion.status
-    counted = flight.station.codec.sources.get((part.sysid, 1))
+    status = state.companion.status or CompanionStatus(state=CompanionState.CONNECTING)
+    counted = flight.station.codec.sources.get((part.sysid, AUTOPILOT), SourceCount())
     moved = flown.in_flight() if flown else Flown(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-    clearance_m = _min_clearance_m(flight.mission, moved)
-    speeds_m_s = np.linalg.norm(moved.velocities_m_s, axis=1)
+    clearance_m = min_clearance_m(flight.mission, moved)
     landed = not state.armed
     return VehicleReport(
         name=part.name,
@@ -168,25 +170,19 @@ def _vehicle_report(flight: FleetFlight, part: VehicleFlight, flown: Flown | Non
         target_error_m=round(_target_error_m(part, moved, horizontal=landed), 3),
         min_clearance_m=round(clearance_m, 3),
         path_length_m=round(float(arc_length(moved.positions_m)[-1]), 2) if len(moved.times_s) else 0.0,
-        flight_time_s=round(float(moved.times_s[-1] - moved.times_s[0]), 2) if len(moved.times_s) else 0.0,
-        max_speed_m_s=round(float(np.linalg.norm(moved.velocities_m_s, axis=1).max()), 3)
-        if len(moved.times_s)
-        else 0.0,
-        tracking_error_m_p99=status.tracking_error_p99_m if status else 0.0,
-        onboard_replans=status.replans if status else 0,
-        replan_ms_p50=status.replan_p50_ms if status else 0.0,
-        replan_ms_p99=status.replan_p99_ms if status else 0.0,
+        flight_time_s=round(float(np.ptp(moved.times_s)), 2) if len(moved.times_s) else 0.0,
+        max_speed_m_s=round(float(np.linalg.norm(moved.velocities_m_s, axis=1).max(initial=0.0)), 3),
+        tracking_error_m_p99=status.tracking_error_p99_m,
+        onboard_replans=status.replans,
+        replan_ms_p50=status.replan_p50_ms,
+        replan_ms_p99=status.replan_p99_ms,
         offboard_losses=part.monitor.offboard_losses,
-        link=LinkReport(
-            sent=flight.station.sent[part.sysid],
-            received=counted.received if counted else 0,
-            lost=counted.lost if counted else 0,
-        ),
+        link=LinkReport(sent=flight.station.sent[part.sysid], received=counted.received, lost=counted.lost),
     )
 
 
-def _min_clearance_m(mission: Mission, moved: Flown) -> float:
-    """The least distance to anything real, unmapped obstacles included; movers are not in it."""
+def min_clearance_m(mission: Mission, moved: Flown) -> float:
+    """The least distance [m] to anything real, unmapped obstacles included; movers are not in it."""
     if len(moved.times_s) == 0:
         return obstacles.FAR_M
     return float(obstacles.clearance(moved.positions_m, obstacles.pack(mission.world)).min())

@@ -1,0 +1,249 @@
+"""Commands, parameters and mission transfer from the ground station's side, message by message."""
+
+import math
+import struct
+
+import pytest
+
+from gcs.dialect import mavlink
+from gcs.errors import CommandRefused, LinkLost, MissionTransferError, ParameterError
+from gcs.flight import actions
+from gcs.microservices.command_client import ATTEMPTS, PROGRESS_TIMEOUT_S, CommandClient
+from gcs.microservices.mission_transfer_client import MissionDownload, MissionUpload, item_message
+from gcs.microservices.parameter_client import ParameterExchange
+from missions.mission_items import MissionItem
+from tests.unit.gcs.messages import command_ack, from_autopilot
+
+PEER = (1, 1)
+ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+ITEMS = [MissionItem(command=16, x=index, y=2 * index, z=10.0 + index, param2=0.3) for index in range(3)]
+
+
+def sent(messages: list) -> list[str]:
+    return [message.get_type() for message in messages]
+
+
+def time_out(service, times: int = 20) -> None:
+    """Let deadline after deadline pass."""
+    for _ in range(times):
+        service.handle_timeout(service.deadline_s)
+
+
+def request(seq: int, *, legacy: bool = False):
+    kind = mavlink.MAVLink_mission_request_message if legacy else mavlink.MAVLink_mission_request_int_message
+    return from_autopilot(kind(255, 190, seq, 0))
+
+
+def mission_ack(result: int = 0):
+    return from_autopilot(mavlink.MAVLink_mission_ack_message(255, 190, result, 0))
+
+
+# ------------------------------------------------------------------ commands
+
+
+def test_a_command_is_repeated_with_rising_confirmation_until_it_is_acknowledged():
+    client = CommandClient(actions.arm(), PEER)
+    confirmations = [client.start(0.0)[0].confirmation]
+    for _ in range(3):
+        confirmations += [message.confirmation for message in client.handle_timeout(client.deadline_s)]
+    assert confirmations == [0, 1, 2, 3]
+    client.receive(command_ack(ARM, mavlink.MAV_RESULT_ACCEPTED), 5.0)
+    assert client.done
+
+
+def test_the_pauses_between_repetitions_grow():
+    client = CommandClient(actions.arm(), PEER)
+    client.start(0.0)
+    pauses = []
+    for _ in range(4):
+        now_s = client.deadline_s
+        client.handle_timeout(now_s)
+        pauses.append(client.deadline_s - now_s)
+    assert pauses == sorted(pauses)
+    assert pauses[0] > 0.5
+
+
+def test_an_unanswered_command_gives_up_with_a_sentence():
+    client = CommandClient(actions.arm(), PEER)
+    client.start(0.0)
+    with pytest.raises(LinkLost, match=f"vehicle 1: arm: no answer to {ATTEMPTS} requests"):
+        time_out(client, ATTEMPTS)
+
+
+def test_a_refusal_is_named():
+    client = CommandClient(actions.arm(), PEER)
+    client.start(0.0)
+    with pytest.raises(CommandRefused, match="vehicle 1: arm: TEMPORARILY_REJECTED"):
+        client.receive(command_ack(ARM, mavlink.MAV_RESULT_TEMPORARILY_REJECTED), 0.1)
+
+
+def test_acknowledgements_of_other_commands_are_not_mine():
+    client = CommandClient(actions.arm(), PEER)
+    client.start(0.0)
+    client.receive(command_ack(mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_RESULT_DENIED), 0.1)
+    assert not client.done
+
+
+def test_a_command_in_progress_is_waited_for():
+    client = CommandClient(actions.arm(), PEER)
+    client.start(0.0)
+    client.receive(command_ack(ARM, mavlink.MAV_RESULT_IN_PROGRESS), 1.0)
+    assert client.deadline_s == 1.0 + PROGRESS_TIMEOUT_S
+
+
+def test_modes_are_commanded_by_px4s_main_and_sub_numbers():
+    from gcs.dialect import Mode
+
+    assert actions.set_mode(Mode.HOLD).params == (1.0, 4.0, 3.0)
+    assert actions.set_mode(Mode.LAND).params == (1.0, 4.0, 6.0)
+    assert actions.take_off(500.0).params[6] == 500.0
+    assert all(math.isnan(param) for param in actions.take_off(500.0).params[:6])
+
+
+# ------------------------------------------------------------------ parameters
+
+
+def value(name: str, number: float, kind: int = mavlink.MAV_PARAM_TYPE_REAL32):
+    return from_autopilot(mavlink.MAVLink_param_value_message(name.encode(), number, kind, 900, 5))
+
+
+def integer(name: str, number: int):
+    as_float = struct.unpack("<f", struct.pack("<i", number))[0]
+    return value(name, as_float, mavlink.MAV_PARAM_TYPE_INT32)
+
+
+def test_an_integer_parameter_is_read_bytewise():
+    exchange = ParameterExchange(PEER, "NAV_DLL_ACT")
+    assert sent(exchange.start(0.0)) == ["PARAM_REQUEST_READ"]
+    exchange.receive(integer("NAV_DLL_ACT", 2), 0.1)
+    assert (exchange.done, exchange.value) == (True, 2)
+
+
+def test_setting_reads_the_type_first_then_sets_and_waits_for_the_echo():
+    exchange = ParameterExchange(PEER, "COM_OBL_RC_ACT", new_value=5)
+    assert sent(exchange.start(0.0)) == ["PARAM_REQUEST_READ"]
+    (setting,) = exchange.receive(integer("COM_OBL_RC_ACT", 0), 0.1)
+    assert setting.get_type() == "PARAM_SET"
+    assert struct.pack("<f", setting.param_value) == struct.pack("<i", 5)
+    assert not exchange.done
+    exchange.receive(integer("COM_OBL_RC_ACT", 5), 0.2)
+    assert exchange.done
+
+
+def test_a_parameter_that_already_has_the_value_is_not_set():
+    exchange = ParameterExchange(PEER, "COM_OF_LOSS_T", new_value=1.0)
+    exchange.start(0.0)
+    assert exchange.receive(value("COM_OF_LOSS_T", 1.0), 0.1) == []
+    assert exchange.done
+
+
+def test_silence_names_the_parameter():
+    exchange = ParameterExchange(PEER, "NO_SUCH_PARAM")
+    exchange.start(0.0)
+    with pytest.raises(ParameterError, match="NO_SUCH_PARAM: no answer"):
+        time_out(exchange)
+
+
+def test_a_parameter_that_does_not_take_the_value_is_an_error_that_shows_both():
+    exchange = ParameterExchange(PEER, "NAV_DLL_ACT", new_value=0)
+    exchange.start(0.0)
+    exchange.receive(integer("NAV_DLL_ACT", 2), 0.1)
+    with pytest.raises(ParameterError, match="expected 0 to be stored, found 2"):
+        time_out(exchange)
+
+
+# ------------------------------------------------------------------ missions
+
+
+@pytest.mark.parametrize("legacy", [True, False])
+def test_an_upload_answers_requests_of_both_kinds_with_int_items(legacy: bool):
+    upload = MissionUpload(ITEMS, PEER)
+    assert sent(upload.start(0.0)) == ["MISSION_COUNT"]
+    for seq, item in enumerate(ITEMS):
+        (answer,) = upload.receive(request(seq, legacy=legacy), 0.1)
+        assert (answer.get_type(), answer.seq, answer.x, answer.current) == (
+            "MISSION_ITEM_INT",
+            seq,
+            item.x,
+            int(seq == 0),
+        )
+    upload.receive(mission_ack(), 0.2)
+    assert upload.done
+    assert upload.acknowledged
+
+
+def test_a_lost_count_is_repeated_and_a_repeated_request_answered_again():
+    upload = MissionUpload(ITEMS, PEER)
+    upload.start(0.0)
+    assert sent(upload.handle_timeout(upload.deadline_s)) == ["MISSION_COUNT"]
+    first = upload.receive(request(0), 1.0)
+    again = upload.receive(request(0), 1.3)
+    assert sent(first) == sent(again) == ["MISSION_ITEM_INT"]
+
+
+def test_a_missing_final_acknowledgement_ends_the_upload_unacknowledged():
+    upload = MissionUpload(ITEMS, PEER)
+    upload.start(0.0)
+    for seq in range(3):
+        upload.receive(request(seq), 0.1)
+    assert upload.handle_timeout(upload.deadline_s) == []
+    assert upload.done
+    assert not upload.acknowledged
+
+
+def test_an_old_acceptance_does_not_end_a_new_upload():
+    upload = MissionUpload(ITEMS, PEER)
+    upload.start(0.0)
+    upload.receive(mission_ack(), 0.1)
+    assert not upload.done
+
+
+def test_a_busy_vehicle_is_asked_again_and_a_refusal_is_named():
+    upload = MissionUpload(ITEMS, PEER)
+    upload.start(0.0)
+    upload.receive(mission_ack(mavlink.MAV_MISSION_ERROR), 0.1)
+    assert sent(upload.handle_timeout(upload.deadline_s)) == ["MISSION_COUNT"]
+    with pytest.raises(MissionTransferError, match="refused: MAV_MISSION_NO_SPACE"):
+        upload.receive(mission_ack(mavlink.MAV_MISSION_NO_SPACE), 2.0)
+
+
+def test_requests_beyond_the_end_are_ignored():
+    upload = MissionUpload(ITEMS, PEER)
+    upload.start(0.0)
+    assert upload.receive(request(7), 0.1) == []
+
+
+def test_a_silent_vehicle_ends_the_upload_with_how_far_it_got():
+    upload = MissionUpload(ITEMS, PEER)
+    upload.start(0.0)
+    upload.receive(request(0), 0.1)
+    with pytest.raises(MissionTransferError, match="no answer after 1 of 3 items"):
+        time_out(upload)
+
+
+def test_a_download_asks_item_by_item_and_again_for_what_is_lost():
+    download = MissionDownload(PEER)
+    assert sent(download.start(0.0)) == ["MISSION_REQUEST_LIST"]
+    download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 3, 0)), 0.1)
+    for seq in range(3):
+        (again,) = download.handle_timeout(download.deadline_s)
+        assert (again.get_type(), again.seq) == ("MISSION_REQUEST_INT", seq)
+        answer = download.receive(from_autopilot(item_message(ITEMS[seq], seq, (255, 190), 0)), 0.2)
+        download.receive(from_autopilot(item_message(ITEMS[seq], seq, (255, 190), 0)), 0.2)
+    assert sent(answer) == ["MISSION_ACK"]
+    assert [(item.x, item.z) for item in download.items] == [(item.x, item.z) for item in ITEMS]
+
+
+def test_an_empty_vehicle_downloads_as_empty():
+    download = MissionDownload(PEER)
+    download.start(0.0)
+    download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 0, 0)), 0.1)
+    assert download.done
+    assert download.items == []
+
+
+def test_an_absurd_count_is_refused():
+    download = MissionDownload(PEER)
+    download.start(0.0)
+    with pytest.raises(MissionTransferError, match="65535 items"):
+        download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 65535, 0)), 0.1)
