@@ -1,12 +1,14 @@
-"""The composition root of `gcs fly`: builds the parts of one flight, runs them together, and takes them down again."""
+"""The composition root: builds the parts of one session, runs them together, and takes them down again."""
 
 import asyncio
 import time
+from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
 from pathlib import Path
 
 import msgspec
 
+from gcs.desk import Desk
 from gcs.errors import GcsError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.picture import draw_flight
@@ -17,16 +19,18 @@ from gcs.flight.trails import Trails
 from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
-from gcs.settings import Fleet as FleetSource
-from gcs.settings import FlightSettings, OriginHere
+from gcs.settings import Autopilots, FlightSettings, OriginHere
 from gcs.station import Station
+from missions.errors import MissionError
 from missions.faults import format_fault
-from missions.frames import GeodeticPoint
 from missions.mission import Mission
 
 TRAIL_INTERVAL_S = 0.05
 HOLD_TIMEOUT_S = 5.0
 TRUTH_FILE = "truth.csv"
+
+Page = Callable[[Desk], Awaitable[None]]
+"""Serves the web page of a desk until it is cancelled."""
 
 
 class FlightApp:
@@ -38,47 +42,55 @@ class FlightApp:
         planner: makes the cloud's plan.
         events: where everything of note is written.
         work_dir: for the report and the logs of all programs.
+        page: serves the web page; None for a headless run, which ends when the flight has ended.
     """
 
     def __init__(
-        self, settings: FlightSettings, mission: Mission, planner: Planner, events: EventLog, work_dir: Path
+        self,
+        settings: FlightSettings,
+        mission: Mission,
+        planner: Planner,
+        events: EventLog,
+        work_dir: Path,
+        page: Page | None = None,
     ) -> None:
-        self.settings, self.events, self.work_dir = settings, events, work_dir
-        self.station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
-        self.flight = FleetFlight(
-            station=self.station,
+        self.settings, self.work_dir, self._page = settings, work_dir, page
+        station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+        flight = FleetFlight(
+            station=station,
             mission=mission,
             mode=settings.mode,
             planner=planner,
             events=events,
             speed=settings.speed,
-            unattended=settings.headless,
+            unattended=page is None,
         )
-        self.trails = Trails(mission.frame)
+        self.flight, self.station, self.events = flight, station, events
+        self.desk = Desk(station, events, flight, Trails(mission.frame))
+        self.report: FlightReport | None = None
         self._started_s = time.monotonic()
 
-    @property
-    def mission(self) -> Mission:
-        return self.flight.mission
-
-    async def fly(self) -> FlightReport:
-        """Start what is to be started, fly, end everything, and write the report.
+    async def run(self) -> FlightReport:
+        """Start what is to be started, fly, end everything, and leave a report.
 
         Raises:
             UsageError: a port in use, or other input that cannot be; nothing has flown.
+            MissionError: the mission cannot be planned for.
         """
         reason = ""
         try:
-            await self._fly_with_everything()
-        except* UsageError as problems:
-            raise problems.exceptions[0] from None
+            await self._run_everything()
+        except* (UsageError, MissionError) as problems:
+            raise _first(problems) from None
         except* GcsError as problems:
-            reason = str(problems.exceptions[0])
+            reason = str(_first(problems))
             self.events.add("failed", reason, severity=Severity.ERROR)
-        return self.write_report(reason)
+        return self.report or self._write_report(reason)
 
-    async def _fly_with_everything(self) -> None:
+    async def _run_everything(self) -> None:
         async with AsyncExitStack() as stack:
+            assert self.station.recording is not None
+            stack.callback(self.station.recording.close)
             for url in self.settings.ground_links():
                 connection = await open_udp(url, self.station.receive)
                 stack.callback(connection.close)
@@ -90,11 +102,13 @@ class FlightApp:
                     group.create_task(self.station.send_heartbeats(), name="heartbeats"),
                     group.create_task(self._sample_trails(), name="trails"),
                 ]
-                if self.settings.fleet is FleetSource.SIMULATED:
+                if self._page is not None:
+                    background.append(group.create_task(_until_cancelled(self._page(self.desk)), name="page"))
+                if self.settings.autopilots is Autopilots.SIMULATED:
                     child = await self._start_simulator(simulator)
                     background.append(group.create_task(simulator.watch(child), name="watch the simulator"))
                 await self._settle_origin()
-                if self.settings.fleet is not FleetSource.ATTACHED and self.settings.mode.needs_companions:
+                if self.settings.starts_companions:
                     for child in await self._start_companions(companions):
                         background.append(group.create_task(self._watch_companion(companions, child)))
                 await self._fly()
@@ -102,20 +116,33 @@ class FlightApp:
                     task.cancel()
 
     async def _fly(self) -> None:
+        """The flight, and with a page what the operator does before and after it."""
         try:
-            await self.flight.fly()
-        except BaseException as ended:  # also Ctrl-C, and a simulator that died
-            if self.flight.in_flight:
-                why = "interrupted" if isinstance(ended, asyncio.CancelledError) else str(ended)
-                await asyncio.shield(self._hold_all(why))
+            await self.desk.fly()
+            self.report = self._write_report("")
+            if self._page is not None:
+                await asyncio.Event().wait()
+        except GcsError as problem:
+            await self._leave_holding(str(problem))
+            self.report = self._write_report(str(problem))
+            if self._page is None:
+                raise
+            self.events.add("failed", str(problem), severity=Severity.ERROR)
+            await asyncio.Event().wait()
+        except BaseException as ended:  # Ctrl-C, a simulator that died, or a defect: nothing is left to itself
+            await self._leave_holding(f"interrupted ({type(ended).__name__})")
             raise
+        finally:
+            await self.desk.close()
 
-    async def _hold_all(self, why: str) -> None:
-        self.events.add("hold", f"commanding Hold to all vehicles in flight: {why}", severity=Severity.WARNING)
-        try:
-            async with asyncio.timeout(HOLD_TIMEOUT_S):
-                await self.flight.hold_all(why)
-        except TimeoutError:
+    async def _leave_holding(self, why: str) -> None:
+        if not self.flight.in_flight:
+            return
+        self.events.add("hold", f"Hold for all vehicles in flight: {why}", severity=Severity.WARNING)
+        orders = asyncio.ensure_future(self.flight.hold_all(why))
+        done, _ = await asyncio.shield(asyncio.wait({orders}, timeout=HOLD_TIMEOUT_S))
+        if not done:
+            orders.cancel()
             self.events.add("hold", "not every vehicle confirmed Hold", severity=Severity.ERROR)
 
     async def _start_simulator(self, processes: Processes) -> Child:
@@ -125,7 +152,7 @@ class FlightApp:
 
     async def _start_companions(self, processes: Processes) -> list[Child]:
         children: list[Child] = []
-        for vehicle in self.mission.vehicles:
+        for vehicle in self.flight.mission.vehicles:
             name = f"companion-{vehicle.sysid}"
             options = ["--vehicle", str(vehicle.sysid), "--mission", self.settings.mission]
             options += ["--mode", self.settings.mode.value, "--seed", str(self.settings.seed)]
@@ -137,32 +164,28 @@ class FlightApp:
         return children
 
     def _common_options(self) -> list[str]:
-        origin = self.mission.origin
+        origin = self.flight.mission.origin
         place = f"{origin.latitude_deg!r},{origin.longitude_deg!r},{origin.altitude_amsl_m!r}"
         settings = self.settings
-        base = ["--speed", f"{settings.speed:g}", "--instance-base", str(settings.instance_base)]
-        return [*base, "--origin", place, "--supervised"]
+        ports = ["--speed", f"{settings.speed:g}", "--instance-base", str(settings.instance_base)]
+        return [*ports, "--origin", place, "--supervised"]
 
     async def _settle_origin(self) -> None:
-        """Move the mission to where it shall be flown."""
-        origin = self.settings.origin
-        if origin is OriginHere.HERE:
-            first = self.mission.vehicles[0]
-            vehicles = self.station.fleet.vehicles
-            await self.station.wait_until(
-                lambda: first.sysid in vehicles and vehicles[first.sysid].place is not None,
-                CONNECT_TIMEOUT_S,
-                f"vehicle {first.sysid} not heard",
-            )
-            place = vehicles[first.sysid].home or vehicles[first.sysid].place
-            assert place is not None
-            origin = origin_here(place, first, self.mission)
-        if isinstance(origin, GeodeticPoint):
-            self._move_to(origin)
-
-    def _move_to(self, origin: GeodeticPoint) -> None:
-        self.flight.mission = self.mission.moved_to(origin)
-        self.trails = Trails(self.mission.frame)
+        """With `--origin here`, move the mission to where its first vehicle stands."""
+        if self.settings.origin is not OriginHere.HERE:
+            return
+        mission, vehicles = self.flight.mission, self.station.fleet.vehicles
+        first = mission.vehicles[0]
+        await self.station.wait_until(
+            lambda: first.sysid in vehicles and vehicles[first.sysid].home is not None,
+            CONNECT_TIMEOUT_S,
+            f"vehicle {first.sysid} not heard, or it has no home position",
+        )
+        home = vehicles[first.sysid].home
+        assert home is not None
+        origin = origin_here(home, first, mission)
+        self.flight.mission = mission.moved_to(origin)
+        self.desk.trails = Trails(self.flight.mission.frame)
         text = f"origin {origin.latitude_deg:.7f}, {origin.longitude_deg:.7f}, {origin.altitude_amsl_m:.1f} m AMSL"
         self.events.add("origin", text)
 
@@ -171,32 +194,42 @@ class FlightApp:
         try:
             await companions.watch(child)
         except (ProcessFailed, UsageError) as ended:
-            if not self.flight.in_flight:
+            if self.report is None and not self.flight.in_flight:
                 raise
             self.events.add("process", str(ended), severity=Severity.ERROR)
 
     async def _sample_trails(self) -> None:
         while True:
-            flights = self.flight.vehicles
-            self.trails.sample(self.station.fleet, {i: flights[i].monitor.ground_offset_m for i in flights})
+            offsets_m = {sysid: part.monitor.ground_offset_m for sysid, part in self.flight.vehicles.items()}
+            assert self.desk.trails is not None
+            self.desk.trails.sample(self.station.fleet, offsets_m)
             await asyncio.sleep(TRAIL_INTERVAL_S / self.settings.speed)
 
-    def write_report(self, reason: str) -> FlightReport:
-        """Write `report.json` and `flight.png`; close the recordings."""
-        assert self.station.recording is not None
-        self.station.recording.close()
+    def _write_report(self, reason: str) -> FlightReport:
+        """Write `report.json` and `flight.png`."""
         flown = self._flown()
         ends_s = [part.times_s[-1] for part in flown.values() if len(part.times_s)]
         wall_s = time.monotonic() - self._started_s
         report = make_report(self.flight, flown, reason=reason, wall_s=wall_s, sim_s=max(ends_s, default=0.0))
         (self.work_dir / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
-        names = {vehicle.sysid: vehicle.name for vehicle in self.mission.vehicles}
+        names = {vehicle.sysid: vehicle.name for vehicle in self.flight.mission.vehicles}
         tracks = {names[sysid]: part.in_flight().positions_m for sysid, part in flown.items() if sysid in names}
-        draw_flight(self.work_dir / "flight.png", self.mission, self.flight.plan, tracks)
+        draw_flight(self.work_dir / "flight.png", self.flight.mission, self.flight.plan, tracks)
         return report
 
     def _flown(self) -> dict[int, Flown]:
         truth = self.work_dir / TRUTH_FILE
-        if self.settings.fleet is FleetSource.SIMULATED and truth.exists():
+        if self.settings.autopilots is Autopilots.SIMULATED and truth.exists():
             return read_truth(truth)
-        return {sysid: flown_from_trail(trail) for sysid, trail in self.trails.by_sysid.items()}
+        assert self.desk.trails is not None
+        return {sysid: flown_from_trail(trail) for sysid, trail in self.desk.trails.by_sysid.items()}
+
+
+async def _until_cancelled(page: Awaitable[None]) -> None:
+    await page
+
+
+def _first(group: BaseExceptionGroup) -> BaseException:
+    """The first error of a group, however deeply it is nested."""
+    first = group.exceptions[0]
+    return _first(first) if isinstance(first, BaseExceptionGroup) else first

@@ -77,11 +77,11 @@ def fly(
         raise UsageError("--sim starts the companions already: give one of --sim and --companions")
     if host not in {"127.0.0.1", "localhost", "::1"}:
         raise UsageError(f"--host {host}: the page is served on loopback only")
-    sources = {(True, False): chosen.Fleet.SIMULATED, (False, True): chosen.Fleet.COMPANIONS}
+    sources = {(True, False): chosen.Autopilots.SIMULATED, (False, True): chosen.Autopilots.COMPANIONS}
     settings = chosen.FlightSettings(
         mission=mission,
         mode=mode,
-        fleet=sources.get((sim, companions), chosen.Fleet.ATTACHED),
+        autopilots=sources.get((sim, companions), chosen.Autopilots.ATTACHED),
         headless=headless,
         speed=speed,
         seed=seed,
@@ -188,7 +188,7 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
         events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
         with PlannerProcess("ecpso", settings.seed, progress.show) as planner:
             flight = FlightApp(settings, mission, planner.plan, events, work_dir)
-            report = asyncio.run(flight.fly())
+            report = asyncio.run(flight.run())
         events.close()
     verdict = "success" if report.success else "FAILED"
     console.say(f"{verdict}: {report.reason}", style="green" if report.success else "bold red")

@@ -25,8 +25,8 @@ class PlanningMode(Enum):
         return self is not PlanningMode.CLOUD
 
 
-class Fleet(Enum):
-    """Which programs the ground station starts itself."""
+class Autopilots(Enum):
+    """Where the autopilots come from, and so which programs the ground station starts."""
 
     SIMULATED = "simulated"
     """The simulator and one companion per vehicle."""
@@ -47,7 +47,7 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     mission: str
     mode: PlanningMode = PlanningMode.END_CLOUD
-    fleet: Fleet = Fleet.ATTACHED
+    autopilots: Autopilots = Autopilots.ATTACHED
     headless: bool = False
     speed: float = 1.0
     seed: int = 0
@@ -58,6 +58,10 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     port: int = 8080
     faults: tuple[Fault, ...] = ()
     instance_base: int = 0
+
+    @property
+    def starts_companions(self) -> bool:
+        return self.mode.needs_companions and self.autopilots is not Autopilots.ATTACHED
 
     def ground_links(self) -> tuple[LinkUrl, ...]:
         """The links that were asked for, or the usual port on loopback."""
