@@ -1,0 +1,28 @@
+"""The cloud planner: targets are allocated, curves and approximate track points planned for all vehicles together.
+
+Layers, each importing only what stands below it:
+
+    planner                          plan_mission: the way in
+    search                           swarms, polish and judge in turn
+    allocation, cooperation          who flies where; one swarm per vehicle
+    refinement                       gradient polish
+    assembly, feasibility            the plan that is handed out, and the judge of it
+    timing, track_points, objective  times, track points and eq. 13 of dense curves
+    problem, representation, curves  a mission as numbers, and back
+    fleet_cost, curve_cost, obstacle_gradient    compiled costs with gradients
+    ecpso, plan, limits, budget      the swarm itself; plain data and definitions
+"""
+
+from gcs.planner.plan import FleetPlan, Limit, Progress, VehiclePlan, Violation
+from gcs.planner.planner import ALGORITHMS, compile_kernels, plan_mission
+
+__all__ = [
+    "ALGORITHMS",
+    "FleetPlan",
+    "Limit",
+    "Progress",
+    "VehiclePlan",
+    "Violation",
+    "compile_kernels",
+    "plan_mission",
+]

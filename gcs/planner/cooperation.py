@@ -1,0 +1,83 @@
+"""One small swarm per vehicle, searching in turn: each against the present curves of all others."""
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.planner.ecpso import Ecpso, EcpsoSettings
+from gcs.planner.fleet_cost import Context, Problem, set_context, swarm_cost
+from gcs.planner.representation import bows, fresh_bows
+
+Array = npt.NDArray[np.float64]
+
+SWEEPS = 2
+"""How often every vehicle chooses among the first particles before the search begins."""
+
+
+class Cooperation:
+    """The swarms of a fleet, and the plan that they improve together.
+
+    Args:
+        problem: what is planned.
+        settings: of every swarm.
+        rng: all randomness; every swarm gets a generator spawned from it.
+    """
+
+    def __init__(self, problem: Problem, settings: EcpsoSettings, rng: np.random.Generator) -> None:
+        self.problem, self._settings = problem, settings
+        n_vehicles, n_control = problem.base_m.shape[:2]
+        self.offsets = np.zeros((n_vehicles, 2 * (n_control - 2)))
+        self.curve_evaluations = 0
+        self._first = bows(n_control)
+
+        def fresh(generator: np.random.Generator, count: int) -> Array:
+            return fresh_bows(generator, count, n_control)
+
+        self._swarms = [Ecpso(self._first, fresh, settings, generator) for generator in rng.spawn(n_vehicles)]
+        self._context = Context(
+            np.zeros((n_vehicles, len(problem.coupling.first), 3)), np.zeros((n_vehicles, n_vehicles))
+        )
+        self._enter_all()
+
+    def start(self) -> None:
+        """Give every vehicle the best of the first particles, in turn, until the choices fit one another."""
+        for _ in range(SWEEPS):
+            for vehicle in range(len(self._swarms)):
+                costs = self._costs(vehicle, self._first)
+                self._enter(vehicle, self._first[int(np.argmin(costs))])
+
+    def round(self) -> None:
+        """Let every swarm search for one window of iterations, and take over what is better than the present plan."""
+        for vehicle, swarm in enumerate(self._swarms):
+            present = float(self._costs(vehicle, self.offsets[vehicle : vehicle + 1])[0])
+            swarm.remember(self._costs(vehicle, swarm.memory))
+            for _ in range(self._settings.window):
+                swarm.tell(self._costs(vehicle, swarm.ask()))
+            position, cost = swarm.best()
+            if cost < present:
+                self._enter(vehicle, position)
+
+    def pose(self, problem: Problem) -> None:
+        """Go on with the same variables, but other limits."""
+        self.problem = problem
+        self._enter_all()
+
+    def adopt(self, offsets: Array) -> None:
+        """Take over a whole plan, (vehicles, d), and let the swarms know of it."""
+        self.offsets = offsets.copy()
+        self._enter_all()
+        for vehicle, swarm in enumerate(self._swarms):
+            swarm.offer(offsets[vehicle], float(self._costs(vehicle, offsets[vehicle : vehicle + 1])[0]))
+
+    def _enter_all(self) -> None:
+        for vehicle, offsets in enumerate(self.offsets):
+            set_context(self.problem, vehicle, offsets, self._context)
+
+    def _enter(self, vehicle: int, offsets: Array) -> None:
+        self.offsets[vehicle] = offsets
+        set_context(self.problem, vehicle, offsets, self._context)
+
+    def _costs(self, vehicle: int, positions: Array) -> Array:
+        objective, violation = np.empty(len(positions)), np.empty(len(positions))
+        swarm_cost(self.problem, vehicle, positions, self._context, objective, violation)
+        self.curve_evaluations += len(positions)
+        return objective + self.problem.terms.penalty_weight * violation

@@ -1,0 +1,197 @@
+"""The judge: does a plan keep every limit of its mission? Plain numpy over dense samples, apart from the search.
+
+A plan is called feasible only by this module. It looks at the curves that the plan hands out, at every sample: at most
+`SPACING_M` apart, so that nothing hides between two of them.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.planner.limits import flight_box, join_distance_m
+from gcs.planner.plan import Limit, VehiclePlan, Violation
+from gcs.planner.timing import curvature
+from missions import obstacles
+from missions.mission import Mission, Site
+
+Array = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+SPACING_M = {Site.INDOOR: 0.05, Site.OUTDOOR: 1.0}
+"""Samples of a curve that is to be judged lie at most so far apart."""
+ROUNDING = 1e-9
+"""Tolerance, for the rounding of floating-point sums alone."""
+
+
+@dataclass(frozen=True)
+class _Fleet:
+    """All vehicles at m common times, and where along their curves the launch zones matter.
+
+    Args:
+        places_m: (vehicles, m, 3) ENU.
+        times_s: (m,) since T0.
+        near_start: (vehicles, m) in the zone around the launch point: separation rests there, contact does not ...
+        joined: (vehicles, m) ... once a vehicle has joined its curve from its pad.
+        near_end: (vehicles, m) in the zone around the target: clearance and height rest in both zones.
+    """
+
+    places_m: Array
+    times_s: Array
+    near_start: BoolArray
+    joined: BoolArray
+    near_end: BoolArray
+
+
+def violations(mission: Mission, vehicles: Sequence[VehiclePlan]) -> tuple[Violation, ...]:
+    """Everything that is wrong with a plan: the worst breach of each limit by each vehicle or pair of vehicles.
+
+    Raises:
+        ValueError: samples are too far apart to be judged, or not those of common times.
+    """
+    fleet = _assemble(mission, vehicles)
+    found: list[Violation] = []
+    for index, vehicle in enumerate(vehicles):
+        found += _ends(mission, vehicle)
+        found += _near_things(mission, vehicle, fleet.near_start[index] | fleet.near_end[index])
+        found += _outside(mission, vehicle)
+        found += _shape(mission, vehicle)
+        found += _reach(mission, vehicle)
+    if len(vehicles) > 1:
+        found += _mean_separations(mission, vehicles, fleet)
+        found += _separations(mission, vehicles, fleet)
+    return tuple(found)
+
+
+def _assemble(mission: Mission, vehicles: Sequence[VehiclePlan]) -> _Fleet:
+    times_s, spacing_m = vehicles[0].times_s, SPACING_M[mission.site]
+    for vehicle in vehicles:
+        if not np.array_equal(vehicle.times_s, times_s):
+            raise ValueError(f"the samples of {vehicle.name}'s curve are not at the times of {vehicles[0].name}'s")
+        apart_m = float(np.linalg.norm(np.diff(vehicle.curve_m, axis=0), axis=1).max())
+        if apart_m > spacing_m:
+            raise ValueError(
+                f"samples of {vehicle.name}'s curve: {apart_m:.3g} m apart, expected at most {spacing_m:g} m"
+            )
+    places_m = np.array([vehicle.curve_m for vehicle in vehicles])
+    flown_m = np.linalg.norm(places_m - places_m[:, :1], axis=-1)
+    ahead_m = np.linalg.norm(places_m - places_m[:, -1:], axis=-1)
+    radius_m = mission.launch_zone_radius_m
+    return _Fleet(places_m, times_s, flown_m < radius_m, flown_m > join_distance_m(mission), ahead_m < radius_m)
+
+
+def _ends(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
+    ends = (
+        (Limit.START, vehicle.curve_m[0], mission.start_m(mission.vehicle(vehicle.sysid))),
+        (Limit.TARGET, vehicle.curve_m[-1], np.array(vehicle.target.position_m)),
+    )
+    for limit, found_m, wanted_m in ends:
+        off_m = float(np.linalg.norm(found_m - wanted_m))
+        if off_m > ROUNDING:
+            yield Violation(vehicle.name, limit, "", off_m, 0.0)
+
+
+def _near_things(mission: Mission, vehicle: VehiclePlan, in_zone: BoolArray) -> Iterator[Violation]:
+    limits, solid = mission.limits, obstacles.pack(mission.world.as_known())
+    clearance_m = obstacles.clearance(vehicle.curve_m, solid)
+    yield from _least(
+        vehicle, Limit.CLEARANCE, clearance_m, np.where(in_zone, limits.body_radius_m, limits.clearance_m)
+    )
+    height_m = vehicle.curve_m[:, 2] - obstacles.terrain_height(vehicle.curve_m, solid)
+    yield from _least(vehicle, Limit.HEIGHT, height_m, np.where(in_zone, 0.0, limits.height_m))
+
+
+def _outside(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
+    low_m, high_m = flight_box(mission)
+    out_m = np.maximum(low_m - vehicle.curve_m, vehicle.curve_m - high_m).max(axis=1)
+    yield from _most(vehicle, Limit.BOUNDS, out_m, 0.0)
+
+
+def _shape(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
+    limits, steps_m = mission.limits, np.diff(vehicle.curve_m, axis=0)
+    radius_m = 1.0 / np.maximum(curvature(vehicle.curve_m), 1e-12)
+    yield from _least(vehicle, Limit.TURN_RADIUS, radius_m, np.full(len(radius_m), limits.turn_radius_m))
+    climb_deg = np.degrees(np.arctan2(np.abs(steps_m[:, 2]), np.linalg.norm(steps_m[:, :2], axis=1)))
+    yield from _most(vehicle, Limit.CLIMB_ANGLE, climb_deg, limits.climb_angle_deg)
+
+
+def _reach(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
+    length_m = float(np.linalg.norm(np.diff(vehicle.curve_m, axis=0), axis=1).sum())
+    if length_m > mission.limits.range_m:
+        yield Violation(vehicle.name, Limit.RANGE, "", length_m, mission.limits.range_m)
+    if vehicle.times_s[-1] > mission.limits.endurance_s:
+        yield Violation(vehicle.name, Limit.ENDURANCE, "", float(vehicle.times_s[-1]), mission.limits.endurance_s)
+
+
+def _mean_separations(mission: Mission, vehicles: Sequence[VehiclePlan], fleet: _Fleet) -> Iterator[Violation]:
+    """The mean over the flight, at equal fractions of the paths, of each vehicle's mean distance to the others."""
+    low_m, high_m = mission.limits.mean_separation_m
+    for vehicle, own_m in zip(vehicles, fleet.places_m, strict=True):
+        apart_m = np.linalg.norm(fleet.places_m - own_m, axis=-1).sum(axis=0) / (len(vehicles) - 1)
+        mean_m = float(np.trapezoid(apart_m) / (len(apart_m) - 1))
+        if mean_m < low_m:
+            yield Violation(vehicle.name, Limit.LEAST_MEAN_SEPARATION, "", mean_m, low_m)
+        if mean_m > high_m:
+            yield Violation(vehicle.name, Limit.GREATEST_MEAN_SEPARATION, "", mean_m, high_m)
+
+
+def _separations(mission: Mission, vehicles: Sequence[VehiclePlan], fleet: _Fleet) -> Iterator[Violation]:
+    """The separation of every two vehicles at all pairs of times that lie no more than the time slack apart."""
+    n = len(vehicles)
+    for i in range(n):
+        short_m, at, shift = _closest(mission, fleet, i)
+        for j in range(n):
+            seen = j < i and shift[j] == 0  # at the same time: reported with j
+            if i == j or seen or short_m[j] <= ROUNDING:
+                continue
+            place, time_s = fleet.places_m[i, at[j]], float(fleet.times_s[at[j]])
+            found_m = float(np.linalg.norm(place - fleet.places_m[j, at[j] + shift[j]]))
+            later_s = fleet.times_s[at[j] + shift[j]] - time_s
+            where = f"{_at(place, time_s)}, to {vehicles[j].name}" + (
+                f" {later_s:.1f} s later" if later_s > 0.0 else ""
+            )
+            yield Violation(vehicles[i].name, Limit.SEPARATION, where, found_m, found_m + float(short_m[j]))
+
+
+def _closest(mission: Mission, fleet: _Fleet, i: int) -> tuple[Array, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Where vehicle i is nearest to each other vehicle that is as late as the time slack allows, or less.
+
+    Returns:
+        Three (vehicles,): how much separation is missing [m], sample of vehicle i, samples that the other is ahead.
+    """
+    limits, times_s, m = mission.limits, fleet.times_s, len(fleet.times_s)
+    worst_m, at, shift = np.full(len(fleet.places_m), -np.inf), *np.zeros((2, len(fleet.places_m)), dtype=np.int64)
+    slack_s = mission.planner.time_slack_s + ROUNDING
+    most = int((np.searchsorted(times_s, times_s + slack_s, "right") - np.arange(m)).max())
+    for ahead in range(min(most, m)):
+        now, then = slice(0, m - ahead), slice(ahead, m)
+        apart_m = np.linalg.norm(fleet.places_m[:, then] - fleet.places_m[i, now], axis=-1)
+        joined = fleet.joined[i, now] & fleet.joined[:, then]
+        resting = fleet.near_start[i, now] & fleet.near_start[:, then]
+        required_m = np.where(resting, np.where(joined, 2.0 * limits.body_radius_m, 0.0), limits.separation_m)
+        short_m = np.where(times_s[then] - times_s[now] <= slack_s, required_m - apart_m, -np.inf)
+        where = np.argmax(short_m, axis=1)
+        found_m = np.take_along_axis(short_m, where[:, None], axis=1)[:, 0]
+        better = found_m > worst_m
+        worst_m[better], at[better], shift[better] = found_m[better], where[better], ahead
+    return worst_m, at, shift
+
+
+def _least(vehicle: VehiclePlan, limit: Limit, found: Array, required: Array) -> Iterator[Violation]:
+    worst = int(np.argmax(required - found))
+    if required[worst] - found[worst] > ROUNDING:
+        where = _at(vehicle.curve_m[worst], float(vehicle.times_s[worst]))
+        yield Violation(vehicle.name, limit, where, float(found[worst]), float(required[worst]))
+
+
+def _most(vehicle: VehiclePlan, limit: Limit, found: Array, required: float) -> Iterator[Violation]:
+    worst = int(np.argmax(found))
+    if found[worst] - required > ROUNDING:
+        where = _at(vehicle.curve_m[worst], float(vehicle.times_s[worst]))
+        yield Violation(vehicle.name, limit, where, float(found[worst]), required)
+
+
+def _at(place_m: Array, time_s: float) -> str:
+    east_m, north_m, up_m = place_m
+    return f"at ({east_m:.1f}, {north_m:.1f}, {up_m:.1f}) m, {time_s:.1f} s after T0"

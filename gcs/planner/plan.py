@@ -1,0 +1,176 @@
+"""What the cloud planner returns: one curve and one track per vehicle, and everything that is wrong with them."""
+
+import json
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from missions.mission import Target
+from missions.mission_items import Track
+
+Array = npt.NDArray[np.float64]
+
+JSON_DECIMALS = 6
+"""Micrometres: turn radii can still be computed from the written samples."""
+
+
+class Limit(Enum):
+    """What a plan has to keep: its name, its unit, and whether it is a least or a greatest value."""
+
+    CLEARANCE = ("clearance", "m", "at least")
+    HEIGHT = ("height above the terrain", "m", "at least")
+    BOUNDS = ("way outside of the flight range", "m", "at most")
+    TURN_RADIUS = ("turn radius", "m", "at least")
+    CLIMB_ANGLE = ("climb angle", "deg", "at most")
+    RANGE = ("path length", "m", "at most")
+    ENDURANCE = ("flight time", "s", "at most")
+    SEPARATION = ("separation", "m", "at least")
+    LEAST_MEAN_SEPARATION = ("mean separation", "m", "at least")
+    GREATEST_MEAN_SEPARATION = ("mean separation", "m", "at most")
+    START = ("distance of the beginning from the launch point", "m", "at most")
+    TARGET = ("distance of the end from the target", "m", "at most")
+
+    @property
+    def title(self) -> str:
+        return self.value[0]
+
+    @property
+    def unit(self) -> str:
+        return self.value[1]
+
+    @property
+    def sense(self) -> str:
+        return self.value[2]
+
+
+@dataclass(frozen=True)
+class Violation:
+    """The worst breach of one limit by one vehicle.
+
+    Args:
+        vehicle: its name.
+        limit: what is not kept.
+        where: place, time and other vehicle, as far as they matter, in words; may be empty.
+        found: in the unit of the limit.
+        required: likewise.
+    """
+
+    vehicle: str
+    limit: Limit
+    where: str
+    found: float
+    required: float
+
+    def __str__(self) -> str:
+        limit, where = self.limit, f" {self.where}" if self.where else ""
+        return (
+            f"{self.vehicle}: {limit.title} {self.found:.4g} {limit.unit}{where}, "
+            f"required is {limit.sense} {self.required:.4g} {limit.unit}"
+        )
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far planning has come.
+
+    Args:
+        iteration: number of swarm iterations so far.
+        evaluations: of whole plans so far; one vehicle's curve counts as the fleet's share of one.
+        objective: of the best plan so far (eq. 13); while it is not feasible, its violations are added as a penalty.
+        feasible: whether the best plan so far keeps all limits.
+        share_done: of the budget, 0 to 1.
+    """
+
+    iteration: int
+    evaluations: int
+    objective: float
+    feasible: bool
+    share_done: float
+
+
+@dataclass(frozen=True)
+class VehiclePlan:
+    """One vehicle's part of a plan.
+
+    Args:
+        name: of the vehicle.
+        sysid: its MAVLink system id.
+        target: where it goes.
+        curve_m: (m, 3) ENU samples from the launch point to the target, equally spaced along the curve; sample i of
+            all vehicles is passed at the same time.
+        times_s: (m,) seconds since the common start T0 at which they are passed.
+        track: the points and speeds that autopilot and companion are given.
+        length_m: of the curve.
+    """
+
+    name: str
+    sysid: int
+    target: Target
+    curve_m: Array
+    times_s: Array
+    track: Track
+    length_m: float
+
+
+@dataclass(frozen=True)
+class FleetPlan:
+    """A plan for all vehicles of a mission.
+
+    Args:
+        mission: its name.
+        algorithm: that found the plan.
+        seed: of its random numbers.
+        evaluations: of whole plans that it took.
+        wall_s: time that it took.
+        cpu_s: likewise, of this thread.
+        objective: eq. 13, summed over all vehicles.
+        feasible: whether the judge (`feasibility`) found no violation.
+        violations: what it found.
+        convergence: the progress after each iteration.
+        vehicles: in the order of the mission.
+    """
+
+    mission: str
+    algorithm: str
+    seed: int
+    evaluations: int
+    wall_s: float
+    cpu_s: float
+    objective: float
+    feasible: bool
+    violations: tuple[Violation, ...]
+    convergence: tuple[Progress, ...]
+    vehicles: tuple[VehiclePlan, ...]
+
+    def to_json(self) -> str:
+        """The plan as `gcs plan --output x.json` writes it; `convergence` is the best objective of each iteration."""
+        head = ("mission", "algorithm", "seed", "evaluations", "wall_s", "cpu_s", "objective", "feasible")
+        document: dict[str, Any] = {name: getattr(self, name) for name in head}
+        document["violations"] = [_violation_as_json(violation) for violation in self.violations]
+        document["convergence"] = [progress.objective for progress in self.convergence]
+        document["vehicles"] = [_vehicle_as_json(vehicle) for vehicle in self.vehicles]
+        return json.dumps(document)
+
+
+def _violation_as_json(violation: Violation) -> dict[str, Any]:
+    return {
+        "vehicle": violation.vehicle,
+        "limit": violation.limit.name.lower(),
+        "where": violation.where,
+        "found": violation.found,
+        "required": violation.required,
+        "text": str(violation),
+    }
+
+
+def _vehicle_as_json(vehicle: VehiclePlan) -> dict[str, Any]:
+    return {
+        "name": vehicle.name,
+        "target": vehicle.target.name,
+        "track_points_enu_m": vehicle.track.points_m.round(JSON_DECIMALS).tolist(),
+        "curve_enu_m": vehicle.curve_m.round(JSON_DECIMALS).tolist(),
+        "length_m": vehicle.length_m,
+    }

@@ -1,0 +1,70 @@
+"""Planning a mission, from the allocation of targets to the judge's verdict."""
+
+import time
+from collections.abc import Callable
+
+from gcs.errors import UsageError
+from gcs.planner.allocation import allocate
+from gcs.planner.budget import new_budget
+from gcs.planner.plan import FleetPlan, Progress
+from gcs.planner.search import FleetSearch
+from missions.kernels import one_at_a_time
+from missions.mission import Mission, load_mission
+
+ALGORITHMS = ("ecpso",)
+
+
+def plan_mission(
+    mission: Mission,
+    *,
+    algorithm: str = "ecpso",
+    seed: int = 0,
+    evaluations: int | None = None,
+    budget_s: float | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+    on_progress: Callable[[Progress], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> FleetPlan:
+    """Allocate targets and plan curves and track points for all vehicles of a mission, in its world as it is known.
+
+    With the same seed and number of evaluations, and no `budget_s`, the curves are the same to the bit.
+
+    Args:
+        mission: what is to be flown.
+        algorithm: one of `ALGORITHMS`.
+        seed: of all random numbers.
+        evaluations: the most evaluations of whole plans; the default suits small fleets.
+        budget_s: the most time on `clock`; may be given beside `evaluations`.
+        clock: monotonic seconds.
+        on_progress: called after every round of the search.
+        should_stop: asked often; True ends the search with the best plan so far.
+
+    Raises:
+        UsageError: there is no such algorithm.
+        InfeasibleMission: vehicles and targets do not go together.
+    """
+    if algorithm not in ALGORITHMS:
+        raise UsageError(f"--algorithm {algorithm}: expected one of {', '.join(ALGORITHMS)}")
+    began_cpu_s = time.thread_time()
+    budget = new_budget(evaluations, budget_s, clock, should_stop)
+    search = FleetSearch(mission, allocate(mission), seed, budget, on_progress or (lambda _: None))
+    found = search.run()
+    return FleetPlan(
+        mission=mission.name,
+        algorithm=algorithm,
+        seed=seed,
+        evaluations=round(search.evaluations),
+        wall_s=clock() - budget.began_s,
+        cpu_s=time.thread_time() - began_cpu_s,
+        objective=found.objective,
+        feasible=not found.violations,
+        violations=found.violations,
+        convergence=tuple(search.convergence),
+        vehicles=found.vehicles,
+    )
+
+
+def compile_kernels() -> None:
+    """Compile everything that planning needs, or load what was compiled before; takes seconds on a fresh machine."""
+    with one_at_a_time("gcs"):
+        plan_mission(load_mission("indoor"), evaluations=1)

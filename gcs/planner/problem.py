@@ -1,0 +1,159 @@
+"""A mission as the search sees it: arrays for the compiled costs, its limits tightened by a margin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.planner import limits
+from gcs.planner.curve_cost import Terms, sampling
+from gcs.planner.fleet_cost import Coupling, Problem
+from gcs.planner.representation import Guide, straight_guide
+from missions import obstacles, time_law
+from missions.mission import Mission, Target
+
+Array = npt.NDArray[np.float64]
+
+CRUISE_MARGIN = 1.1
+"""With this many times the avoidance distance of clearance, a vehicle surely flies at cruise speed."""
+PENALTY = 0.3
+"""A violation of one costs as much as this share of the fleet's mean straight flight."""
+MEAN_UNIT_SHARE = 0.1
+"""A mean separation that is off by this share of its upper bound, or of the mission's size, is a violation of one."""
+
+FRACTIONS = 48
+"""Fractions of the paths at which vehicles are compared."""
+
+
+@dataclass(frozen=True)
+class Route:
+    """Where one vehicle goes."""
+
+    name: str
+    sysid: int
+    start_m: Array
+    """(3,) ENU."""
+    target: Target
+
+    @property
+    def target_m(self) -> Array:
+        return np.array(self.target.position_m)
+
+    @property
+    def direct_m(self) -> float:
+        """Length of the straight line."""
+        return float(np.linalg.norm(self.target_m - self.start_m))
+
+
+@dataclass(frozen=True)
+class Care:
+    """How closely the search looks, and how far it stays away from the limits for what it does not see.
+
+    Args:
+        samples: of each curve.
+        distance_share: by which clearance, height, bounds and separation are kept better than required.
+        share: likewise for means, angles and lengths.
+        turn_share: likewise for the turn radius.
+    """
+
+    samples: int = 64
+    distance_share: float = 0.02
+    share: float = 0.002
+    turn_share: float = 0.02
+
+    def raised(self) -> "Care":
+        """For a plan that the judge refused: twice as close, twice as far away."""
+        return Care(2 * self.samples, 2.0 * self.distance_share, 2.0 * self.share, 2.0 * self.turn_share)
+
+
+def straight_guides(mission: Mission, routes: list[Route]) -> list[Guide]:
+    """The straight line of every route."""
+    n_control, bounds = mission.planner.control_points, mission.world.bounds
+    return [straight_guide(route.start_m, route.target_m, n_control, bounds) for route in routes]
+
+
+def pose(mission: Mission, routes: list[Route], guides: list[Guide], care: Care = Care()) -> Problem:
+    """The arrays that the compiled costs read."""
+    return Problem(
+        base_m=np.array([guide.base_m for guide in guides]),
+        axes_m=np.array([guide.axes_m for guide in guides]),
+        samples=sampling(len(guides[0].base_m), care.samples),
+        terms=_terms(mission, routes, care),
+        coupling=_coupling(mission, routes, care),
+        obstacles=obstacles.pack(mission.world.as_known()),
+    )
+
+
+def _terms(mission: Mission, routes: list[Route], care: Care) -> Terms:
+    kept, weights = mission.limits, mission.planner
+    straight_cost = weights.length_weight * _mean_direct_m(routes)
+    unit_m = max(kept.clearance_m, kept.body_radius_m)
+    margin_m = care.distance_share * unit_m
+    low_m, high_m = _inside(limits.flight_box(mission), margin_m, routes)
+    clearance_cap_m = limits.clearance_cap_m(mission, mission.world.as_known())
+    clearance_m = kept.clearance_m + margin_m
+    cruise_m = CRUISE_MARGIN * kept.avoidance_distance_m
+    return Terms(
+        length_weight=weights.length_weight,
+        clearance_weight=weights.clearance_weight,
+        height_weight=weights.height_weight,
+        clearance_cap_m=clearance_cap_m,
+        height_cap_m=limits.height_cap_m(mission),
+        look_m=max(clearance_cap_m, clearance_m, kept.body_radius_m, cruise_m),
+        slow_cost=straight_cost * (kept.cruise_speed_m_s / kept.avoidance_speed_m_s - 1.0),
+        slow_m=kept.avoidance_distance_m,
+        cruise_m=cruise_m,
+        penalty_weight=PENALTY * straight_cost,
+        clearance_m=clearance_m,
+        contact_m=kept.body_radius_m + margin_m,
+        height_m=kept.height_m + margin_m,
+        zone_radius_m=mission.launch_zone_radius_m,
+        turn_radius_m=kept.turn_radius_m * (1.0 + care.turn_share),
+        climb_sine=float(np.sin(np.radians(kept.climb_angle_deg))) * (1.0 - care.share),
+        length_m=limits.path_limit_m(mission) * (1.0 - care.share),
+        unit_m=unit_m,
+        low_m=low_m,
+        high_m=high_m,
+    )
+
+
+def _coupling(mission: Mission, routes: list[Route], care: Care) -> Coupling:
+    kept = mission.limits
+    mean_low_m, mean_high_m = kept.mean_separation_m
+    first, last = _windows(mission, max(route.direct_m for route in routes))
+    return Coupling(
+        separation_m=kept.separation_m * (1.0 + care.distance_share),
+        zone_radius_m=mission.launch_zone_radius_m,
+        contact_m=2.0 * kept.body_radius_m * (1.0 + care.distance_share),
+        join_m=limits.join_distance_m(mission),
+        mean_low_m=mean_low_m * (1.0 + care.share),
+        mean_high_m=mean_high_m * (1.0 - care.share),
+        mean_unit_m=MEAN_UNIT_SHARE * min(mean_high_m, _mean_direct_m(routes)),
+        first=first,
+        last=last,
+    )
+
+
+def _mean_direct_m(routes: list[Route]) -> float:
+    return max(float(np.mean([route.direct_m for route in routes])), 1e-3)
+
+
+def _inside(box_m: tuple[Array, Array], margin_m: float, routes: list[Route]) -> tuple[Array, Array]:
+    """The box drawn in by a margin, but not past any start or target."""
+    ends = np.array([route.start_m for route in routes] + [route.target_m for route in routes])
+    return np.minimum(box_m[0] + margin_m, ends.min(axis=0)), np.maximum(box_m[1] - margin_m, ends.max(axis=0))
+
+
+def _windows(mission: Mission, longest_m: float) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """(k,) first and last fraction at which a vehicle may be that is up to the time slack early or late.
+
+    Taken from the fastest flight: whoever is slower gets less far out of step.
+    """
+    kept = mission.limits
+    along = np.zeros((FRACTIONS, 3))
+    along[:, 0] = np.linspace(0.0, longest_m, FRACTIONS)
+    cruise_m_s = np.full(FRACTIONS, kept.cruise_speed_m_s)
+    times_s = time_law.times_along(along, time_law.speeds_along(along, cruise_m_s, kept.acceleration_m_s2))
+    slack_s = mission.planner.time_slack_s + 1e-9
+    first, last = np.searchsorted(times_s, times_s - slack_s), np.searchsorted(times_s, times_s + slack_s, "right") - 1
+    return first.astype(np.int64), last.astype(np.int64)

@@ -1,0 +1,91 @@
+"""How a plan is written as numbers: offsets of B-spline control points from a guide path, which is mostly straight.
+
+Each inner control point may move sideways and up or down, seen along the guide path; an offset of one is half the
+search range, the `reach`. Nothing moves along the path. All offsets zero is the guide path itself, flown evenly.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from missions import bspline
+from missions.world import Bounds
+
+Array = npt.NDArray[np.float64]
+
+UP = np.array([0.0, 0.0, 1.0])
+EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+
+REACH_SHARE = 0.5
+"""Offsets reach at most this share of the distance from start to target, or across the flight range."""
+
+LATERAL_BOWS = (0.0, 0.15, -0.15, 0.35, -0.35, 0.6, -0.6)
+VERTICAL_BOWS = (0.0, 0.25, 0.5, -0.25)
+"""Offsets in the middle of the first particles' curves."""
+SKEW = 2.0
+"""Fresh bows are widest after this share of the way to the power of -1 to 1: earlier or later than in the middle."""
+
+
+@dataclass(frozen=True)
+class Guide:
+    """The guide path of one vehicle: (n, 3) control points without offsets, and what offsets of one move them by.
+
+    Args:
+        base_m: (n, 3) ENU, start and target included.
+        axes_m: (n - 2, 2, 3) lateral and vertical axis of each inner control point, as long as the reach.
+    """
+
+    base_m: Array
+    axes_m: Array
+
+
+def abscissae(n_control: int) -> Array:
+    """(n,) Greville abscissae: control points there on a straight line give a curve that is flown evenly."""
+    knots = bspline.clamped_knots(n_control)
+    return np.array([knots[i + 1 : i + 1 + bspline.DEGREE].mean() for i in range(n_control)])
+
+
+def straight_guide(start_m: Array, target_m: Array, n_control: int, bounds: Bounds) -> Guide:
+    """The straight line from start to target."""
+    base = start_m + abscissae(n_control)[:, None] * (target_m - start_m)
+    return Guide(base, _axes(np.tile(target_m - start_m, (n_control - 2, 1)), base, bounds))
+
+
+def guide_along(path_m: Array, n_control: int, bounds: Bounds) -> Guide:
+    """A guide along an (m, 3) polygon: control points at equal steps of its length, axes across its direction."""
+    lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(path_m, axis=0), axis=1))))
+    where = abscissae(n_control) * lengths[-1]
+    base = np.stack([np.interp(where, lengths, path_m[:, axis]) for axis in range(3)], axis=-1)
+    return Guide(base, _axes(base[2:] - base[:-2], base, bounds))
+
+
+def bows(n_control: int) -> Array:
+    """(particles, 2 (n - 2)) offsets of the deterministic first particles: the guide path bent to all sides."""
+    t = abscissae(n_control)[1:-1]
+    shape = 4.0 * t * (1.0 - t)
+    ways = [(lateral, vertical) for vertical in VERTICAL_BOWS for lateral in LATERAL_BOWS]
+    return np.einsum("k,pa->pka", shape, np.array(ways)).reshape(len(ways), -1)
+
+
+def fresh_bows(rng: np.random.Generator, count: int, n_control: int) -> Array:
+    """(count, 2 (n - 2)) offsets of random bows, each the sum of one to a side and one up or down."""
+    t = abscissae(n_control)[1:-1]
+    skewed = t ** (SKEW ** rng.uniform(-1.0, 1.0, (count, 2, 1)))
+    heights = rng.uniform(-1.0, 1.0, (count, 2, 1)) * np.array([max(LATERAL_BOWS), max(VERTICAL_BOWS)])[:, None]
+    return (4.0 * heights * skewed * (1.0 - skewed)).transpose(0, 2, 1).reshape(count, 2 * len(t))
+
+
+def _axes(directions: Array, base_m: Array, bounds: Bounds) -> Array:
+    """(k, 2, 3) axes across (k, 3) directions: level to the left, and upwards."""
+    reach_m = REACH_SHARE * float(np.linalg.norm(np.diff(base_m, axis=0), axis=1).sum())
+    lengths_m = np.linalg.norm(directions, axis=1, keepdims=True)
+    along = np.where(lengths_m > 0.0, directions / np.maximum(lengths_m, 1e-9), EAST)
+    lateral = np.cross(UP, along)
+    upright = np.linalg.norm(lateral, axis=1) < 1e-6
+    lateral[upright] = NORTH
+    lateral /= np.linalg.norm(lateral, axis=1, keepdims=True)
+    size_m = bounds.high_enu_m - bounds.low_enu_m
+    return np.stack(
+        (lateral * min(reach_m, max(size_m[:2])), np.cross(along, lateral) * min(reach_m, size_m[2])), axis=1
+    )

@@ -1,0 +1,122 @@
+"""The search for a plan of a whole fleet: cooperative swarms, gradient polish of what they find, the judge's verdict.
+
+The loop, per round: every vehicle's swarm searches against the others' curves; the plan that comes out is polished;
+if that looks feasible and better than the best so far, the judge looks at it. Where the judge finds a breach between
+the samples that the search looks at, it looks closer from then on and keeps farther away.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.planner.assembly import Candidate, assemble
+from gcs.planner.budget import Budget
+from gcs.planner.cooperation import Cooperation
+from gcs.planner.ecpso import EcpsoSettings
+from gcs.planner.fleet_cost import all_control_points
+from gcs.planner.plan import Progress
+from gcs.planner.problem import Care, Route, pose, straight_guides
+from gcs.planner.refinement import Refined, Stage, refine
+from missions.mission import Mission
+
+Array = npt.NDArray[np.float64]
+
+QUICK = (Stage(1.0, 40), Stage(10.0, 20), Stage(100.0, 20))
+"""Polish of the first particles: a feasible plan soon."""
+THOROUGH = (Stage(1.0, 60), Stage(10.0, 40), Stage(100.0, 20))
+"""Polish of what a round of the swarms has found."""
+LOOKS_FEASIBLE = 1e-5
+"""A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge."""
+MERIT_STRICTNESS = 100.0
+"""Two polished plans are compared with violations weighing so many times more than in the search."""
+MOST_RAISES = 3
+"""How often the search may be made more careful."""
+
+
+class FleetSearch:
+    """The search for one mission.
+
+    Args:
+        mission: what is to be planned.
+        routes: who goes where.
+        seed: of all random numbers.
+        budget: when to end.
+        on_progress: called after every round.
+    """
+
+    def __init__(
+        self, mission: Mission, routes: list[Route], seed: int, budget: Budget, on_progress: Callable[[Progress], None]
+    ) -> None:
+        self._mission, self._routes, self._budget, self._on_progress = mission, routes, budget, on_progress
+        self._care, self._raises = Care(), 0
+        self._guides = straight_guides(mission, routes)
+        self._settings = EcpsoSettings()
+        self._problem = pose(mission, routes, self._guides, self._care)
+        self._swarms = Cooperation(self._problem, self._settings, np.random.default_rng(seed))
+        self._present: Refined | None = None
+        self._best: Candidate | None = None
+        self._polishes = self._iterations = 0
+        self.convergence: list[Progress] = []
+
+    @property
+    def evaluations(self) -> float:
+        """Of whole plans; one vehicle's curve counts as the fleet's share of one."""
+        return self._polishes + self._swarms.curve_evaluations / len(self._routes)
+
+    def run(self) -> Candidate:
+        """Search until the budget is used up: the best plan that the judge found feasible, or the least bad one."""
+        self._swarms.start()
+        self._polish(QUICK)
+        self._report()
+        while self._budget.share_done(self.evaluations) < 1.0 and not self._budget.interrupted():
+            self._swarms.round()
+            self._iterations += self._settings.window
+            self._polish(THOROUGH)
+            self._report()
+        if self._best is not None:
+            return self._best
+        assert self._present is not None
+        return self._assembled(self._present.offsets)
+
+    def _polish(self, stages: tuple[Stage, ...]) -> None:
+        """Polish the swarms' plan; take it over if it is better than the present one, and let the judge see it."""
+        refined = refine(self._problem, self._swarms.offsets, stages, self._budget.interrupted)
+        self._polishes += refined.evaluations
+        if self._present is None or self._merit(refined) < self._merit(self._present):
+            self._present = refined
+        self._swarms.adopt(self._present.offsets)
+        if self._present is refined and refined.violation < LOOKS_FEASIBLE:
+            self._show_judge(refined)
+
+    def _show_judge(self, refined: Refined) -> None:
+        candidate = self._assembled(refined.offsets)
+        if candidate.violations:
+            self._look_closer()
+        elif self._best is None or candidate.objective < self._best.objective:
+            self._best = candidate
+
+    def _look_closer(self) -> None:
+        """After a breach that the search did not see."""
+        if self._raises == MOST_RAISES:
+            return
+        self._raises += 1
+        self._care = self._care.raised()
+        self._problem = pose(self._mission, self._routes, self._guides, self._care)
+        self._swarms.pose(self._problem)
+        self._present = None
+
+    def _merit(self, refined: Refined) -> float:
+        return refined.objective + MERIT_STRICTNESS * self._problem.terms.penalty_weight * refined.violation
+
+    def _assembled(self, offsets: Array) -> Candidate:
+        return assemble(self._mission, self._routes, all_control_points(self._problem, offsets))
+
+    def _report(self) -> None:
+        assert self._present is not None
+        feasible = self._best is not None
+        found = self._best.objective if self._best is not None else self._merit(self._present)
+        share_done = self._budget.share_done(self.evaluations)
+        progress = Progress(self._iterations, int(self.evaluations), found, feasible, share_done)
+        self.convergence.append(progress)
+        self._on_progress(progress)
