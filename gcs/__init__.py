@@ -4,7 +4,8 @@ Layers, each importing only what stands below it:
 
     cli             commands and their help
     app             composition root: builds the parts, runs them in one TaskGroup
-    view            the viser page: reads state, emits the operator's intents
+    view            the viser page: reads the desk, hands in the operator's intents
+    desk            what can be seen and done in a session
     flight          the flight sequence, its checks, monitor and reports
     station         all vehicles on all links: routes messages to services and state
     microservices   sans-IO MAVLink services (commands, missions, parameters)

@@ -154,6 +154,45 @@ def check(mission: MissionArgument) -> None:
 
 
 @app.command()
+def watch(
+    link: LinkOption = None,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
+) -> None:
+    """Show whatever is on the links in the web page, and command it from there.
+
+    Example:
+
+        gcs watch --link udpin://0.0.0.0:14550
+    """
+    from gcs.console import FlightConsole
+    from gcs.flight.events import EventLog
+    from gcs.view.server import serve_page
+    from gcs.watch import watch as run_watch
+
+    links = tuple(parse_link_url(text) for text in link or ()) or chosen.FlightSettings(mission="").ground_links()
+    console = FlightConsole()
+    events = EventLog(time.monotonic, listeners=[console.show])
+    console.say(f"page: http://127.0.0.1:{port}")
+    asyncio.run(run_watch(links, events, lambda desk: serve_page(desk, "127.0.0.1", port)))
+
+
+@app.command()
+def doctor() -> None:
+    """Say whether everything is here that a flight needs, and compile the planner if that is still to be done."""
+    from gcs.doctor import examine
+    from gcs.planner import compile_kernels
+
+    fine = True
+    for finding in examine():
+        fine = fine and finding.fine
+        print(f"{'ok ' if finding.fine else 'BAD'}  {finding.what:12} {finding.found}", flush=True)
+    began_s = time.perf_counter()
+    compile_kernels()
+    print(f"ok   planner      compiled and loaded in {time.perf_counter() - began_s:.1f} s")
+    raise typer.Exit(0 if fine else 1)
+
+
+@app.command()
 def missions() -> None:
     """List the shipped missions."""
     for name in shipped_missions():

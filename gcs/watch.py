@@ -1,0 +1,44 @@
+"""`gcs watch`: the page alone, attached to whatever is on the links; it starts no program and arms nothing."""
+
+import asyncio
+from contextlib import AsyncExitStack
+
+from gcs.app import TRAIL_INTERVAL_S, Page
+from gcs.desk import Desk
+from gcs.flight.events import EventLog
+from gcs.flight.trails import Trails
+from gcs.link.udp import open_udp
+from gcs.link.url import LinkUrl
+from gcs.station import Station
+from missions.frames import LocalFrame
+
+
+async def watch(links: tuple[LinkUrl, ...], events: EventLog, page: Page) -> None:
+    """Serve the page until cancelled.
+
+    Raises:
+        UsageError: a port in use.
+    """
+    station = Station()
+    desk = Desk(station, events)
+    async with AsyncExitStack() as stack:
+        for url in links:
+            connection = await open_udp(url, station.receive)
+            stack.callback(connection.close)
+            station.connections.append(connection)
+            events.add("link", f"listening on {url}")
+        async with asyncio.TaskGroup() as group:
+            group.create_task(station.send_heartbeats(), name="heartbeats")
+            group.create_task(_sample_trails(desk), name="trails")
+            await page(desk)
+
+
+async def _sample_trails(desk: Desk) -> None:
+    """Without a mission, the frame is that of the first vehicle's home."""
+    while True:
+        if desk.trails is None:
+            home = next((state.home for state in desk.vehicles.values() if state.home is not None), None)
+            desk.trails = Trails(LocalFrame(home)) if home is not None else None
+        else:
+            desk.trails.sample(desk.station.fleet, {})
+        await asyncio.sleep(TRAIL_INTERVAL_S)
