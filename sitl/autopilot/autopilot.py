@@ -1,0 +1,188 @@
+"""One vehicle's autopilot: everything that decides, put together; no MAVLink frames."""
+
+from collections.abc import Callable
+
+from sitl.autopilot.battery import Battery
+from sitl.autopilot.commander import Commander, Situation
+from sitl.autopilot.craft import Craft
+from sitl.autopilot.flight_control import FlightControl
+from sitl.autopilot.geofence import Geofence
+from sitl.autopilot.modes import Mode
+from sitl.autopilot.navigator import Navigator
+from sitl.autopilot.offboard import Offboard
+from sitl.autopilot.parameter_table import Parameter
+from sitl.autopilot.parameters import Parameters
+from sitl.autopilot.places import LocalPoint, OwnFrame
+from sitl.autopilot.plan import Plan
+from sitl.autopilot.reports import Result, Say, Severity
+from sitl.snapshot import Snapshot
+
+FENCE_CHECK_S = 0.2
+HOME_SET_S = 0.5
+"""Home is set when the estimator has settled, this long after boot."""
+
+
+class Autopilot:
+    """Commander, navigator and what they need.
+
+    Args:
+        control: the way to the vehicle's control.
+        frame: its own NED frame.
+        table: its parameters.
+        speed: simulated seconds per wall-clock second; the loss timeouts grow with it.
+        say: where texts for the pilot go.
+        on_reached: called with the sequence number of every mission item that has been reached.
+    """
+
+    def __init__(
+        self,
+        control: FlightControl,
+        frame: OwnFrame,
+        table: tuple[Parameter, ...],
+        speed: float,
+        say: Say,
+        on_reached: Callable[[int], None],
+    ) -> None:
+        self.parameters = Parameters(table, speed, control.set_gain)
+        self.craft = Craft(control, self.parameters, frame, say, home=LocalPoint(0.0, 0.0, 0.0))
+        self.battery = Battery(self.parameters)
+        self.commander = Commander(self.parameters, say)
+        self.offboard = Offboard(self.parameters, say)
+        self.fence = Geofence(self.craft)
+        self.navigator = Navigator(self.craft, self.offboard, self.fence, on_reached)
+        self.rally = Plan()
+        self.home_known = False
+        self.gcs_lost = True
+        """Kept up to date by whoever hears the ground station."""
+        self._say = say
+        self._snapshot: Snapshot | None = None
+        self._now_s = 0.0
+        self._mission_problem: str | None = ""
+        self._fence_breached = False
+        self._fence_inside = True
+        self._next_fence_s = 0.0
+        self._was_landed = True
+        self._was_armed = False
+
+    # ------------------------------------------------------------------ state
+    @property
+    def snapshot(self) -> Snapshot:
+        """The last view of the vehicle."""
+        assert self._snapshot is not None  # nobody asks before the first tick
+        return self._snapshot
+
+    @property
+    def now_s(self) -> float:
+        return self._now_s
+
+    @property
+    def armed(self) -> bool:
+        return self.commander.armed
+
+    @property
+    def mode(self) -> Mode:
+        return self.commander.mode
+
+    @property
+    def mission_ready(self) -> bool:
+        return self._mission_problem is None
+
+    # --------------------------------------------------------------- requests
+    def situation(self) -> Situation:
+        s = self.snapshot
+        return Situation(
+            landed=bool(s.landed),
+            offboard_alive=self.offboard.is_alive(self._now_s),
+            mission_ready=self.mission_ready,
+            gcs_lost=self.gcs_lost,
+            battery=self.battery.warning,
+            fence_breached=self._fence_breached,
+            crashed=bool(s.crash),
+            at_rest=bool(s.grounded),
+        )
+
+    def refresh(self) -> Commander:
+        """The commander, up to date with what has come in since the last tick."""
+        self.commander.observe(self.situation(), self._now_s)
+        return self.commander
+
+    def arm(self, *, forced: bool = False) -> Result:
+        return self.refresh().arm("external command", forced=forced)
+
+    def disarm(self, *, forced: bool = False) -> Result:
+        return self.refresh().disarm("external command", forced=forced)
+
+    def request_mode(self, mode: Mode) -> Result:
+        return self.refresh().request_mode(mode)
+
+    def set_mission(self, plan: Plan) -> None:
+        """Store a mission; whether it can be flown is found out at once, and said."""
+        self.navigator.set_mission(plan)
+        self._check_mission()
+
+    def set_fence(self, plan: Plan) -> None:
+        """Store a fence; one that the vehicle is outside of is not enforced until it has been inside."""
+        self.fence.set_plan(plan)
+        s = self.snapshot
+        self._fence_inside = self.fence.zones_allow(LocalPoint(s.x_m, s.y_m, s.z_m))
+        if not self._fence_inside:
+            self._say(Severity.CRITICAL, "Geofence invalid, doesn't contain current vehicle position")
+        self._check_mission()
+
+    def set_rally(self, plan: Plan) -> None:
+        self.rally = plan
+
+    def set_home(self, point: LocalPoint | None = None) -> None:
+        """Home is here, or at a point."""
+        s = self.snapshot
+        self.craft.set_home(point or LocalPoint(s.x_m, s.y_m, s.z_m), s.yaw_rad, self._now_s)
+        self.home_known = True
+
+    # ------------------------------------------------------------------- tick
+    def tick(self, s: Snapshot, now_s: float, dt_s: float) -> None:
+        """Let the autopilot look at its vehicle and decide what the control does next."""
+        self._snapshot, self._now_s = s, now_s
+        self.battery.update(self.commander.armed, dt_s)
+        if now_s >= self._next_fence_s:
+            self._next_fence_s = now_s + FENCE_CHECK_S
+            self._check_fence(s)
+        self._announce_landing(bool(s.landed))
+        self.commander.observe(self.situation(), now_s)
+        self.commander.update()
+        if not self.home_known and now_s >= HOME_SET_S:
+            self.set_home()
+        self._fly(s, now_s)
+
+    def _fly(self, s: Snapshot, now_s: float) -> None:
+        commander = self.commander
+        if commander.armed and not self._was_armed:  # home is where the vehicle stands
+            self.set_home()
+            self.craft.speed_override_m_s = None
+        self._was_armed = commander.armed
+        if not commander.armed or commander.mode is Mode.TERMINATION:
+            self.navigator.stop()
+        elif self.navigator.update(commander.mode, s, now_s):
+            commander.mode_finished(commander.mode)
+
+    def _announce_landing(self, landed: bool) -> None:
+        landed = landed or not self.commander.armed
+        if self._was_landed and not landed:
+            self._say(Severity.INFO, "Takeoff detected")
+        elif landed and not self._was_landed and self.commander.armed:
+            self._say(Severity.INFO, "Landing detected")
+            self.navigator.land_detected()
+        self._was_landed = landed
+
+    def _check_mission(self) -> None:
+        self._mission_problem = self.navigator.mission_problem()
+        if self._mission_problem:
+            self._say(Severity.CRITICAL, self._mission_problem)
+
+    def _check_fence(self, s: Snapshot) -> None:
+        here = LocalPoint(s.x_m, s.y_m, s.z_m)
+        allowed = self.fence.allows(here)
+        self._fence_inside = self._fence_inside or self.fence.zones_allow(here)
+        breached = self._fence_inside and not allowed and not s.landed
+        if breached and not self._fence_breached and self.parameters["GF_ACTION"] > 0:
+            self._say(Severity.CRITICAL, "Geofence violation: approaching or outside geofence")
+        self._fence_breached = breached

@@ -1,0 +1,74 @@
+"""PX4's flight modes, and how HEARTBEAT and CURRENT_MODE show them."""
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+MANUAL_INPUT, STABILIZE, GUIDED, AUTO, CUSTOM = 64, 16, 8, 4, 1
+"""Bits of MAV_MODE_FLAG."""
+SAFETY_ARMED = 128
+
+
+class MainMode(IntEnum):
+    """The second highest byte of custom_mode."""
+
+    MANUAL = 1
+    ALTITUDE = 2
+    POSITION = 3
+    AUTO = 4
+    ACRO = 5
+    OFFBOARD = 6
+    STABILIZED = 7
+    TERMINATION = 10
+
+
+@dataclass(frozen=True)
+class ModeTraits:
+    """What distinguishes a mode on the wire and for arming."""
+
+    label: str
+    """As PX4's texts call it."""
+    main: MainMode
+    sub: int = 0
+    base_mode: int = CUSTOM | AUTO | GUIDED | STABILIZE
+    standard_mode: int = 0
+    """MAV_STANDARD_MODE."""
+    flies: bool = True
+    """False: it needs a pilot's sticks, or equipment, which this autopilot does not have."""
+    allows_arming: bool = True
+
+
+_STICKS = CUSTOM | MANUAL_INPUT | STABILIZE
+
+
+class Mode(Enum):
+    """A flight mode."""
+
+    MANUAL = ModeTraits("Manual", MainMode.MANUAL, base_mode=_STICKS, flies=False)
+    ALTITUDE = ModeTraits("Altitude", MainMode.ALTITUDE, base_mode=_STICKS, standard_mode=4, flies=False)
+    POSITION = ModeTraits("Position", MainMode.POSITION, base_mode=_STICKS, standard_mode=1, flies=False)
+    POSITION_SLOW = ModeTraits("Position Slow", MainMode.POSITION, 2, base_mode=_STICKS, flies=False)
+    ACRO = ModeTraits("Acro", MainMode.ACRO, base_mode=CUSTOM | MANUAL_INPUT, flies=False)
+    STABILIZED = ModeTraits("Stabilized", MainMode.STABILIZED, base_mode=_STICKS, flies=False)
+    OFFBOARD = ModeTraits("Offboard", MainMode.OFFBOARD, base_mode=CUSTOM | STABILIZE)
+    TAKEOFF = ModeTraits("Takeoff", MainMode.AUTO, 2, standard_mode=8)
+    HOLD = ModeTraits("Hold", MainMode.AUTO, 3)
+    MISSION = ModeTraits("Mission", MainMode.AUTO, 4, standard_mode=6)
+    RTL = ModeTraits("Return", MainMode.AUTO, 5, standard_mode=5, allows_arming=False)
+    LAND = ModeTraits("Land", MainMode.AUTO, 6, standard_mode=7, allows_arming=False)
+    TERMINATION = ModeTraits("Termination", MainMode.TERMINATION, base_mode=CUSTOM, allows_arming=False)
+
+    @property
+    def custom_mode(self) -> int:
+        return self.value.sub << 24 | self.value.main << 16
+
+    @property
+    def label(self) -> str:
+        return self.value.label
+
+
+def mode_of(main: int, sub: int) -> Mode | None:
+    """The mode with these numbers, if this autopilot has it."""
+    for mode in Mode:
+        if mode.value.main == main and (mode.value.sub == sub or main not in (MainMode.AUTO, MainMode.POSITION)):
+            return mode
+    return None

@@ -1,0 +1,122 @@
+"""Flies what the commander has decided: one flight mode at a time, and the orders that pilots give to them."""
+
+import math
+from collections.abc import Callable
+
+from sitl.autopilot.craft import Craft
+from sitl.autopilot.flight_modes import Descend, FlightMode, Hold, Land, Return, Takeoff
+from sitl.autopilot.geofence import Geofence
+from sitl.autopilot.mission_flight import MissionFlight
+from sitl.autopilot.modes import Mode
+from sitl.autopilot.offboard import Offboard
+from sitl.autopilot.places import LocalPoint
+from sitl.autopilot.plan import Cmd, Plan
+from sitl.autopilot.reports import Severity
+from sitl.snapshot import Snapshot
+
+
+class Navigator:
+    """The flight modes of one vehicle."""
+
+    def __init__(self, craft: Craft, offboard: Offboard, fence: Geofence, on_reached: Callable[[int], None]) -> None:
+        self._craft = craft
+        self._offboard = offboard
+        self._fence = fence
+        self._takeoff = Takeoff(craft)
+        self._hold = Hold(craft)
+        self._return = Return(craft)
+        self.mission = MissionFlight(craft, on_reached)
+        self._modes: dict[Mode, FlightMode] = {
+            Mode.TAKEOFF: self._takeoff,
+            Mode.HOLD: self._hold,
+            Mode.LAND: Land(craft),
+            Mode.RTL: self._return,
+            Mode.POSITION: Descend(craft),
+        }
+        self._flown: Mode | None = None
+        self._returning = False
+
+    # ----------------------------------------------------------------- orders
+    def order_takeoff(self, altitude_amsl_m: float, yaw_rad: float) -> None:
+        """NAV_TAKEOFF: for the next time that Takeoff begins."""
+        self._takeoff.order(altitude_amsl_m, yaw_rad)
+
+    def reposition(self, target: LocalPoint, yaw_rad: float, s: Snapshot, now_s: float) -> None:
+        """DO_REPOSITION: for Hold, now or very soon; a NaN coordinate keeps what there is."""
+        finite = LocalPoint(*(c if math.isfinite(c) else here for c, here in zip(target, s, strict=False)))
+        if self._fence.allows(finite):
+            self._hold.order(target, yaw_rad, now_s)
+        else:
+            self._craft.say(Severity.CRITICAL, "Reposition is outside geofence")
+
+    def set_mission(self, plan: Plan) -> None:
+        self.mission.set_plan(plan)
+
+    def mission_problem(self) -> str | None:
+        """Why the stored mission cannot be flown; an empty string for one that is not there."""
+        items = self.mission.plan.items
+        if not items:
+            return ""
+        outside = self._fence.first_outside(items)
+        if outside is not None:
+            return f"Geofence violation for waypoint {outside + 1}"
+        if all(item.command in (Cmd.DO_CHANGE_SPEED, Cmd.DO_JUMP) for item in items):
+            return "Mission has nothing to fly"
+        return None
+
+    # ------------------------------------------------------------------- tick
+    def stop(self) -> None:
+        """Disarmed or terminated: the motors stand."""
+        self._leave()
+        self._craft.control.motors_off()
+
+    def update(self, mode: Mode, s: Snapshot, now_s: float) -> bool:
+        """Fly a mode for one tick; returns whether it has come to its end."""
+        entering = mode is not self._flown
+        if entering:
+            self._leave()
+            self._flown = mode
+        if mode is Mode.OFFBOARD:
+            self._offboard.apply(self._craft.control, entering=entering)
+            return False
+        if mode is Mode.MISSION:
+            return self._fly_mission(s, now_s, entering)
+        flight_mode = self._modes.get(mode)
+        if flight_mode is None:  # a mode with sticks, which can only be chosen on the ground
+            self._craft.control.idle()
+            return False
+        if entering:
+            flight_mode.start(s, now_s)
+        finished = flight_mode.update(s, now_s)
+        if finished and mode is Mode.TAKEOFF:
+            self._hold_at(self._takeoff.target, now_s)
+        return finished
+
+    def land_detected(self) -> None:
+        self.mission.land_detected()
+
+    def _fly_mission(self, s: Snapshot, now_s: float, entering: bool) -> bool:
+        if entering:
+            self._returning = False
+            self.mission.start(s, now_s)
+        if self.mission.wants_return:
+            if not self._returning:
+                self._returning = True
+                self._return.start(s, now_s)
+            self._return.update(s, now_s)
+            return False
+        self._returning = False
+        finished = self.mission.update(s, now_s)
+        if finished:
+            self._hold_at(self.mission.target, now_s)
+        return finished
+
+    def _hold_at(self, target: LocalPoint | None, now_s: float) -> None:
+        """Hold, which follows, shall stay where the mode before has come to."""
+        if target is not None:
+            self._hold.order(target, math.nan, now_s)
+
+    def _leave(self) -> None:
+        if self._flown is Mode.MISSION:
+            self.mission.stop()
+        self._flown = None

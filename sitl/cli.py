@@ -1,0 +1,124 @@
+"""`sitl`: simulated vehicles with PX4's manners, for a ground station and companions to fly."""
+
+import asyncio
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from missions.errors import MissionError
+from missions.frames import GeodeticPoint
+from missions.kernels import one_at_a_time
+from missions.mission import Mission, load_mission
+from sitl.dynamics.airframe import AirframeName
+from sitl.errors import BadPlace, SitlError
+from sitl.service import serve
+from sitl.settings import HIGHEST_INSTANCE_BASE, SIH_HOME, Settings, open_field
+from sitl.simulator import Simulator
+
+BAD_USAGE = 2
+PATIENCE_S = 2.0
+"""Compiling that takes longer than this is announced."""
+
+EPILOG = "Examples:  sitl indoor  |  sitl --vehicles 3 --speed 5  |  sitl field --truth truth.csv --airframe sih"
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@app.command(epilog=EPILOG)
+def fly(
+    mission: Annotated[str | None, typer.Argument(help="Mission file, or the name of a shipped mission.")] = None,
+    vehicles: Annotated[
+        int | None, typer.Option(min=1, max=250, help="Instead of a mission: this many, on open ground.")
+    ] = None,
+    speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Simulated seconds per second.")] = 1.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything random: one seed, one flight.")] = 1,
+    truth: Annotated[Path | None, typer.Option(help="Write where the vehicles really are to this CSV file.")] = None,
+    instance_base: Annotated[int, typer.Option(min=0, max=HIGHEST_INSTANCE_BASE, help="Shift all ports by this.")] = 0,
+    origin: Annotated[str | None, typer.Option(help="LAT,LON,ALT: move the mission there.")] = None,
+    airframe: Annotated[AirframeName, typer.Option(help="The body of all vehicles.")] = AirframeName.X500_LIKE,
+    supervised: Annotated[bool, typer.Option("--supervised", help="End when standard input does.")] = False,
+) -> None:
+    """Simulate the vehicles of a mission, each an autopilot with PX4's manners on two UDP ports.
+
+    Vehicle i talks to the ground station on UDP 14550 from port 18570+(i-1), and to its companion on
+    14540+(i-1) from 14580+(i-1). Ctrl-C ends it.
+    """
+    if (mission is None) == (vehicles is None):
+        raise typer.BadParameter("expected a MISSION or --vehicles, one of the two")
+    settings = Settings(
+        speed=speed, seed=seed, truth=truth, instance_base=instance_base, airframe=airframe, supervised=supervised
+    )
+    try:
+        flown = _mission(mission, vehicles, origin)
+        simulator = warm_simulator(flown, settings)
+        asyncio.run(serve(simulator, settings))
+    except* (MissionError, SitlError, OSError) as problems:
+        for problem in problems.exceptions:
+            print(f"sitl: {problem}", file=sys.stderr)
+        raise typer.Exit(BAD_USAGE) from None
+
+
+def main() -> None:
+    """Entry point of the `sitl` command."""
+    app()
+
+
+def warm_simulator(mission: Mission, settings: Settings) -> Simulator:
+    """A simulator whose compiled code is there, so that its first step takes no longer than the others."""
+    with _announced("sitl: compiling the physics, on a machine's first run only"), one_at_a_time("sitl"):
+        rehearsal = Simulator(mission, seed=settings.seed, airframe=settings.airframe.airframe)
+        rehearsal.step()
+    now_us = time.time_ns() // 1000
+    return Simulator(
+        mission,
+        seed=settings.seed,
+        speed=settings.speed,
+        airframe=settings.airframe.airframe,
+        utc_start_us=now_us,
+    )
+
+
+def _mission(name: str | None, n_vehicles: int | None, origin: str | None) -> Mission:
+    """The mission to simulate, moved if need be.
+
+    Raises:
+        MissionError: the file cannot be used.
+        BadPlace: the origin is no place.
+    """
+    mission = load_mission(name) if name is not None else open_field(n_vehicles or 1, SIH_HOME)
+    return mission if origin is None else mission.moved_to(_place(origin))
+
+
+def _place(text: str) -> GeodeticPoint:
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+    except ValueError:
+        raise BadPlace(text) from None
+    if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0 and -500.0 <= altitude <= 9000.0):
+        raise BadPlace(text)
+    return GeodeticPoint(latitude_deg=latitude, longitude_deg=longitude, altitude_amsl_m=altitude)
+
+
+@contextmanager
+def _announced(text: str) -> Iterator[None]:
+    """Say on standard error what takes so long, and for how long already, if it takes long."""
+    over = threading.Event()
+    begun_s = time.monotonic()
+
+    def announce() -> None:
+        while not over.wait(PATIENCE_S):
+            print(f"{text} ({time.monotonic() - begun_s:.0f} s)", file=sys.stderr, flush=True)
+
+    thread = threading.Thread(target=announce, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()

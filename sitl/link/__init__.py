@@ -1,0 +1,1 @@
+"""What lies between the vehicles and the outside: sockets, the faults of the ground link, the truth log."""

@@ -1,0 +1,42 @@
+"""Forwarding between a vehicle's two links, by PX4's rules: this is how the ground station reaches the companion.
+
+Messages without a target, and those for everybody, go to the other link. A targeted message goes there if its target
+has been heard there. What is for the autopilot alone, comes from its own id, or is unknown, stays.
+"""
+
+from sitl.dialect import Message
+from sitl.microservices.outbox import AUTOPILOT_COMPID, Link, Sender
+
+
+class Router:
+    """Who has been heard on which link.
+
+    Args:
+        sysid: the vehicle's own.
+    """
+
+    def __init__(self, sysid: int) -> None:
+        self._sysid = sysid
+        self._heard: dict[Link, set[tuple[int, int]]] = {link: set() for link in Link}
+
+    def forwards(self, message: Message, sender: Sender) -> bool:
+        """Take note of the sender; whether the message goes on to the other link."""
+        if sender.sysid == self._sysid and sender.compid == AUTOPILOT_COMPID:
+            return False
+        self._heard[sender.link].add((sender.sysid, sender.compid))
+        target = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        if target == 0:
+            return True
+        if target == self._sysid and component == AUTOPILOT_COMPID:
+            return False
+        there = self._heard[sender.link.other]
+        if component == 0:
+            return any(sysid == target for sysid, _ in there)
+        return (target, component) in there
+
+    def is_for_autopilot(self, message: Message) -> bool:
+        """Whether the autopilot itself is meant, alone or among others."""
+        target = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return target in (0, self._sysid) and component in (0, AUTOPILOT_COMPID)

@@ -1,0 +1,307 @@
+"""What the vehicle can tell: one function per MAVLink message, from the autopilot's state to the message's fields.
+
+Fields stand in the order of the message's definition. Values that PX4's simulator holds constant are constant here too;
+they were read off a real PX4. A function returns None while it has nothing to say.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from missions.mission import Positioning
+from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.modes import SAFETY_ARMED, Mode
+from sitl.autopilot.offboard import Ignore
+from sitl.autopilot.places import LocalPoint
+from sitl.dialect import mavlink
+from sitl.dynamics.airframe import GRAVITY_M_S2
+from sitl.dynamics.state import Guidance
+from sitl.snapshot import Snapshot
+
+NAN = math.nan
+NO_COVARIANCE = (NAN,) * 21
+
+SENSORS_PRESENT, SENSORS_ENABLED = 0x0300402D, 0x0301402D
+SENSORS_HEALTHY = 0x2320C83F
+PREARM_BIT = 0x10000000
+MISSION_NONE = 65535
+
+
+class Moment(NamedTuple):
+    """All that a message is made from."""
+
+    autopilot: Autopilot
+    s: Snapshot
+    now_s: float
+    utc_us: int
+    """UTC of now: the simulation's start plus simulated time."""
+    positioning: Positioning
+    sysid: int
+
+    @property
+    def time_boot_ms(self) -> int:
+        return round(self.now_s * 1e3)
+
+    @property
+    def time_us(self) -> int:
+        return round(self.now_s * 1e6)
+
+
+Build = Callable[[Moment], tuple | None]
+
+
+# ---------------------------------------------------------------- state
+def heartbeat(m: Moment) -> tuple:
+    commander = m.autopilot.commander
+    mode = commander.mode
+    base = mode.value.base_mode
+    if mode is Mode.OFFBOARD and not m.autopilot.offboard.ever_heard:
+        base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    base |= SAFETY_ARMED if commander.armed or mode is Mode.TERMINATION else 0
+    status = commander.system_status.value
+    return mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, base, mode.custom_mode, status, 3
+
+
+def sys_status(m: Moment) -> tuple:
+    battery = m.autopilot.battery
+    armable = m.autopilot.commander.armed or m.autopilot.commander.ready
+    health = SENSORS_HEALTHY | (PREARM_BIT if armable else 0)
+    voltage_mv, percent = round(battery.voltage_v * 1e3), round(battery.remaining * 100.0)
+    load = 180
+    return SENSORS_PRESENT, SENSORS_ENABLED, health, load, voltage_mv, -100, percent, 0, 0, 0, 0, 0, 0, 0, 0, 1
+
+
+def extended_sys_state(m: Moment) -> tuple:
+    return mavlink.MAV_VTOL_STATE_UNDEFINED, landed_state(m)
+
+
+def landed_state(m: Moment) -> int:
+    """MAV_LANDED_STATE."""
+    autopilot = m.autopilot
+    if m.s.landed or not autopilot.armed:
+        return mavlink.MAV_LANDED_STATE_ON_GROUND
+    control = autopilot.craft.control
+    if control.guidance is Guidance.LAND:
+        return mavlink.MAV_LANDED_STATE_LANDING
+    taking_off = control.guidance is Guidance.WAYPOINT and control.taking_off
+    return mavlink.MAV_LANDED_STATE_TAKEOFF if taking_off else mavlink.MAV_LANDED_STATE_IN_AIR
+
+
+def current_mode(m: Moment) -> tuple:
+    commander = m.autopilot.commander
+    mode = commander.mode
+    return mode.value.standard_mode, mode.custom_mode, commander.intended.custom_mode
+
+
+def battery_status(m: Moment) -> tuple:
+    battery = m.autopilot.battery
+    voltages = (round(battery.voltage_v * 1e3),) + (65535,) * 9
+    return 0, 1, 1, 32767, voltages, -100, 0, -1, round(battery.remaining * 100.0), 0, 1, (0,) * 4, 0, 0
+
+
+def mission_current(m: Moment) -> tuple:
+    mission = m.autopilot.navigator.mission
+    total = len(mission.plan.items) or MISSION_NONE
+    ids = (mission.plan.plan_id, m.autopilot.fence.plan.plan_id, m.autopilot.rally.plan_id)
+    return mission.current, total, 0, 0, *ids
+
+
+def home_position(m: Moment) -> tuple | None:
+    autopilot = m.autopilot
+    if not autopilot.home_known:
+        return None
+    craft = autopilot.craft
+    place = craft.frame.on_earth(craft.home)
+    half_yaw = 0.5 * craft.home_yaw_rad
+    q = (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
+    here = _e7(place.latitude_deg), _e7(place.longitude_deg), round(place.altitude_m * 1e3)
+    return *here, *craft.home, q, 0.0, 0.0, 0.0, round(craft.home_set_s * 1e6)
+
+
+def gps_global_origin(m: Moment) -> tuple:
+    origin = m.autopilot.craft.frame.origin
+    return _e7(origin.latitude_deg), _e7(origin.longitude_deg), round(origin.altitude_m * 1e3), m.time_us
+
+
+def system_time(m: Moment) -> tuple:
+    return m.utc_us, m.time_boot_ms
+
+
+def timesync(m: Moment) -> tuple:
+    return 0, round(m.now_s * 1e9)
+
+
+def ping(m: Moment) -> tuple:
+    return m.time_us, round(m.now_s) & 0xFFFFFFFF, 0, 0
+
+
+def autopilot_version(m: Moment) -> tuple:
+    c = mavlink
+    capabilities = (
+        c.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+        | c.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+        | c.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        | c.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | c.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        | c.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+        | c.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+        | c.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+        | c.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        | c.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+        | c.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+    )
+    version = 0x01100040  # 1.16.0 alpha, which this simulator was compared with
+    nothing = (0,) * 8
+    return capabilities, version, version, 0, 1, nothing, nothing, nothing, 0, 0, m.sysid, (0,) * 18
+
+
+# --------------------------------------------------------------- motion
+def attitude(m: Moment) -> tuple:
+    s = m.s
+    return m.time_boot_ms, s.roll_rad, s.pitch_rad, s.yaw_rad, s.p_rad_s, s.q_rad_s, s.r_rad_s
+
+
+def attitude_quaternion(m: Moment) -> tuple:
+    s = m.s
+    return m.time_boot_ms, s.qw, s.qx, s.qy, s.qz, s.p_rad_s, s.q_rad_s, s.r_rad_s, (0.0,) * 4
+
+
+def local_position_ned(m: Moment) -> tuple:
+    s = m.s
+    return m.time_boot_ms, s.x_m, s.y_m, s.z_m, s.vx_m_s, s.vy_m_s, s.vz_m_s
+
+
+def odometry(m: Moment) -> tuple:
+    """As PX4's estimator has it: pose and velocity both in the local NED frame."""
+    s, ned = m.s, mavlink.MAV_FRAME_LOCAL_NED
+    across, up = m.positioning.horizontal_std_m**2, m.positioning.vertical_std_m**2
+    speed = m.positioning.velocity_std_m_s**2
+    pose_covariance = (across, *_NANS_5, across, *_NANS_4, up, *_NANS_3, 3e-4, NAN, NAN, 3e-4, NAN, 1.5e-3)
+    velocity_covariance = (speed, *_NANS_5, speed, *_NANS_4, speed, *_NANS_9)
+    pose = s.x_m, s.y_m, s.z_m, (s.qw, s.qx, s.qy, s.qz)
+    motion = s.vx_m_s, s.vy_m_s, s.vz_m_s, s.p_rad_s, s.q_rad_s, s.r_rad_s
+    autopilot = mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT
+    return m.time_us, ned, ned, *pose, *motion, pose_covariance, velocity_covariance, 0, autopilot, 0
+
+
+def global_position_int(m: Moment) -> tuple:
+    s = m.s
+    place = _e7(s.latitude_deg), _e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
+    velocity = round(s.vx_m_s * 100.0), round(s.vy_m_s * 100.0), round(s.vz_m_s * 100.0)
+    return m.time_boot_ms, *place, *velocity, round(_heading_deg(s.yaw_rad) * 100.0) % 36000
+
+
+def gps_raw_int(m: Moment) -> tuple:
+    s = m.s
+    altitude_mm = round(s.altitude_m * 1e3)
+    course = round(_heading_deg(math.atan2(s.vy_m_s, s.vx_m_s)) * 100.0) % 36000
+    place = _e7(s.latitude_deg), _e7(s.longitude_deg), altitude_mm
+    speed = round(s.ground_speed_m_s * 100.0)
+    return m.time_us, 3, *place, 70, 110, speed, course, 10, altitude_mm, 900, 1780, 400, 0, 0
+
+
+def vfr_hud(m: Moment) -> tuple:
+    s = m.s
+    heading = round(_heading_deg(s.yaw_rad)) % 360
+    return 0.0, s.ground_speed_m_s, heading, round(s.thrust * 100.0), s.altitude_m, -s.vz_m_s
+
+
+def altitude(m: Moment) -> tuple:
+    s = m.s
+    return m.time_us, s.altitude_m, s.altitude_m, -s.z_m, s.height_m, 0.0, s.height_m
+
+
+def highres_imu(m: Moment) -> tuple:
+    s = m.s
+    felt = s.force_x_m_s2, s.force_y_m_s2, s.force_z_m_s2, s.p_rad_s, s.q_rad_s, s.r_rad_s
+    updated = 0b1_1010_0011_1111  # accelerometer, gyroscope, pressure and its altitude, temperature
+    return m.time_us, *felt, 0.0, 0.0, 0.0, _pressure_hpa(s), 0.0, s.altitude_m, _temperature_c(s), updated, 0
+
+
+def scaled_pressure(m: Moment) -> tuple:
+    return m.time_boot_ms, _pressure_hpa(m.s), 0.0, round(_temperature_c(m.s) * 100.0), 0
+
+
+def estimator_status(m: Moment) -> tuple:
+    flags = 895  # attitude, velocities, positions absolute and predicted, height above ground
+    across, up = m.positioning.horizontal_std_m, m.positioning.vertical_std_m
+    return m.time_us, flags, 0.1, 0.05, 0.04, 0.08, 0.01, NAN, across, up
+
+
+def vibration(m: Moment) -> tuple:
+    return m.time_us, 0.0, 0.0, 0.0, 0, 0, 0
+
+
+# ------------------------------------------------------------- setpoints
+def attitude_target(m: Moment) -> tuple:
+    s = m.s
+    q = s.setpoint_qw, s.setpoint_qx, s.setpoint_qy, s.setpoint_qz
+    return m.time_boot_ms, 0, q, s.setpoint_p_rad_s, s.setpoint_q_rad_s, s.setpoint_r_rad_s, s.thrust
+
+
+def position_target_local_ned(m: Moment) -> tuple:
+    s = m.s
+    motion = _setpoint_velocity(s), _setpoint_acceleration(s)
+    position = s.setpoint_x_m, s.setpoint_y_m, s.setpoint_z_m
+    mask = _ignored((*position, *motion[0], *motion[1]))
+    heading = s.setpoint_yaw_rad, _finite(s.setpoint_yawspeed_rad_s)
+    return m.time_boot_ms, 1, mask, *position, *motion[0], *motion[1], *heading
+
+
+def position_target_global_int(m: Moment) -> tuple | None:
+    """The target of an auto mode; only in the air."""
+    autopilot, s = m.autopilot, m.s
+    if s.landed or autopilot.craft.control.guidance not in (Guidance.WAYPOINT, Guidance.LAND):
+        return None
+    place = autopilot.craft.frame.on_earth(LocalPoint(*autopilot.craft.control.target_m))
+    target = _e7(place.latitude_deg), _e7(place.longitude_deg), place.altitude_m
+    heading = s.setpoint_yaw_rad, _finite(s.setpoint_yawspeed_rad_s)
+    return m.time_boot_ms, 5, 0, *target, *_setpoint_velocity(s), *_setpoint_acceleration(s), *heading
+
+
+def servo_output_raw(m: Moment) -> tuple:
+    s = m.s
+    if m.autopilot.armed:
+        motors = tuple(round(1000.0 + 1000.0 * u) for u in (s.motor_1, s.motor_2, s.motor_3, s.motor_4))
+    else:
+        motors = (900,) * 4
+    time_us = m.time_us & 0xFFFFFFFF
+    return time_us, 0, *motors, *(900,) * 12
+
+
+# --------------------------------------------------------------- details
+_NANS_3, _NANS_4, _NANS_5, _NANS_9 = (NAN,) * 3, (NAN,) * 4, (NAN,) * 5, (NAN,) * 9
+
+
+def _e7(degrees: float) -> int:
+    return round(degrees * 1e7)
+
+
+def _heading_deg(yaw_rad: float) -> float:
+    return math.degrees(yaw_rad) % 360.0
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
+def _setpoint_velocity(s: Snapshot) -> tuple[float, float, float]:
+    return s.setpoint_vx_m_s, s.setpoint_vy_m_s, s.setpoint_vz_m_s
+
+
+def _setpoint_acceleration(s: Snapshot) -> tuple[float, float, float]:
+    return s.setpoint_ax_m_s2, s.setpoint_ay_m_s2, s.setpoint_az_m_s2
+
+
+def _ignored(numbers: tuple[float, ...]) -> int:
+    """POSITION_TARGET_TYPEMASK of nine numbers, NaN for what is not controlled."""
+    return sum(int(bit) for bit, number in zip(Ignore, numbers, strict=False) if math.isnan(number))
+
+
+def _pressure_hpa(s: Snapshot) -> float:
+    """Of the standard atmosphere."""
+    return 1013.25 * (1.0 - 2.25577e-5 * s.altitude_m) ** 5.25588
+
+
+def _temperature_c(s: Snapshot) -> float:
+    return 15.0 - 6.65e-4 * GRAVITY_M_S2 * s.altitude_m
