@@ -120,7 +120,7 @@ class Vehicle:
             "MISSION_REQUEST_LIST": lambda m, s: transfers[s.link].receive_request_list(m, s, self._now_s),
             "MISSION_REQUEST_INT": lambda m, s: transfers[s.link].receive_request_int(m, s, self._now_s),
             "MISSION_REQUEST": lambda m, s: transfers[s.link].receive_request(m, s, self._now_s),
-            "MISSION_ACK": lambda m, s: transfers[s.link].receive_ack(m, s),
+            "MISSION_ACK": lambda m, s: transfers[s.link].receive_ack(m, s, self._now_s),
             "MISSION_CLEAR_ALL": lambda m, s: transfers[s.link].receive_clear_all(m, s),
             "MISSION_SET_CURRENT": lambda m, s: transfers[s.link].receive_set_current(m),
         }

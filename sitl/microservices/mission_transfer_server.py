@@ -244,13 +244,18 @@ class MissionTransferServer:
         return download.next_seq >= download.count
 
     # ------------------------------------------------------------------ other
-    def receive_ack(self, message: Message, sender: Sender) -> None:
-        """MISSION_ACK from the client: ends its download, cancels its upload."""
+    def receive_ack(self, message: Message, sender: Sender, now_s: float) -> None:
+        """MISSION_ACK from the client: ends its download, cancels its upload, or wants to be asked otherwise."""
         if self._download is not None and self._download.sender == sender:
             self._download = None
-        cancelled = message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED
-        if self._upload is not None and self._upload.sender == sender and cancelled:
+        upload = self._upload
+        if upload is None or upload.sender != sender:
+            return
+        if message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED:
             self._end_upload()
+        elif message.type == mavlink.MAV_MISSION_UNSUPPORTED:  # the client speaks the other kind of items
+            self._asks_int = not self._asks_int
+            self._ask(upload, now_s)
 
     def receive_clear_all(self, message: Message, sender: Sender) -> None:
         """MISSION_CLEAR_ALL: one type, or all."""
