@@ -1,0 +1,142 @@
+"""The door of the onboard planner: a request in, a trajectory that ends at rest (or the reason why not) out."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.planner.braking import brake_along
+from companion.planner.dominance import objective_weights
+from companion.planner.evaluation import HARD
+from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around
+from companion.planner.limits import flight_limits, surroundings
+from companion.planner.local_plan import Horizon, LocalPlanner
+from companion.planner.reference import LEG_SPEED, Way
+from companion.planner.safety import worst_lack
+from companion.planner.spline_shape import spline_shape
+from companion.settings import Reserve, SearchSettings
+from missions import obstacles
+from missions.mission import Mission
+from missions.mission_items import Track
+from missions.time_law import arc_length
+from missions.trajectory import Motion, Trajectory
+
+Array = npt.NDArray[np.float64]
+
+CELLS_PER_VOXEL = 2.0
+LONGEST_DURATION = 2.2
+"""A plan lasts no longer than so many times the horizon at cruise speed: its knots stay close together."""
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """One replan.
+
+    Args:
+        number: comes back with the answer.
+        start: the state in which the trajectory begins, ENU.
+        start_s: when it begins, vehicle time [s].
+        guide: what is followed.
+        arc_m: how much of the guide is done.
+        committed: the trajectory being flown, to begin the search with.
+    """
+
+    number: int
+    start: Motion
+    start_s: float
+    guide: Guide
+    arc_m: float
+    committed: Trajectory | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The answer to a request.
+
+    Args:
+        request: what was asked.
+        trajectory: None when there is no path.
+        guide: the request's, or one that was led around something.
+        reaches_end: it comes to rest at the end of the guide.
+    """
+
+    request: PlanRequest
+    trajectory: Trajectory | None
+    guide: Guide
+    reaches_end: bool = False
+
+
+class Planner:
+    """Plans for one vehicle of one mission.
+
+    Args:
+        mission: world, limits, horizon.
+        reserve: how much of the limits is used.
+        search: settings of the swarm.
+        rng: all randomness.
+        zones_m: (z, 3) centres of launch zones: where this vehicle's curve starts, and its target.
+    """
+
+    def __init__(
+        self, mission: Mission, reserve: Reserve, search: SearchSettings, rng: np.random.Generator, zones_m: Array
+    ) -> None:
+        horizon_m, phi = mission.onboard.horizon_m, mission.planner
+        self.limits = flight_limits(mission, reserve)
+        self._required = flight_limits(mission, replace(reserve, distance_share=0.0))
+        self._around = surroundings(mission, obstacles.pack(mission.world.as_known()), zones_m)
+        self._local = LocalPlanner(
+            self.limits,
+            self._around,
+            Horizon(horizon_m, LONGEST_DURATION * horizon_m / mission.limits.cruise_speed_m_s),
+            spline_shape(search.control_points),
+            search,
+            objective_weights(phi.length_weight, phi.clearance_weight, phi.height_weight),
+        )
+        self._rng = rng
+        self._cell_m = CELLS_PER_VOXEL * mission.onboard.voxel_m
+
+    @property
+    def horizon_m(self) -> float:
+        return self._local.horizon.length_m
+
+    def lay_guide(self, track: Track, index: int, from_m: Array) -> Guide:
+        """The guide from a place along the rest of a track, not yet led around anything."""
+        return lay_guide(track, index, from_m, self.horizon_m, self.limits)
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Plan along the request's guide, which is first led around what blocks it."""
+        guide = lead_around(request.guide, self._around, self.limits, self.horizon_m, self._cell_m)
+        if guide is None or guide is request.guide:  # without a way around, as far as it goes
+            return self._plan_along(request, request.guide, request.arc_m)
+        return self._plan_along(request, guide, guide.project(request.start.position_m, 0.0, guide.length_m))
+
+    def is_clear(self, trajectory: Trajectory, now_s: float) -> bool:
+        """The rest of a committed trajectory keeps what the mission requires (the reserve is not asked for)."""
+        done = min(max(now_s - trajectory.start_s, 0.0), trajectory.duration_s) / trajectory.knot_interval_s
+        return worst_lack(trajectory.control_points_m, done, self._required, self._around) == 0.0
+
+    def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
+        """Come to rest on the committed path as soon as the limits allow."""
+        return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)
+
+    def _plan_along(self, request: PlanRequest, guide: Guide, arc_m: float) -> Plan:
+        warm = None if request.committed is None else self._warm_way(request, request.committed, guide, arc_m)
+        plan = self._local.plan(guide.way, arc_m, np.array(request.start), warm, self._rng)
+        trajectory = Trajectory(plan.control_m, request.start_s, plan.knot_s)
+        if plan.value[HARD] > 0.0 or not self.is_clear(trajectory, request.start_s):
+            return Plan(request, None, guide)
+        return Plan(request, trajectory, guide, plan.goal_arc_m >= guide.length_m)
+
+    def _warm_way(self, request: PlanRequest, committed: Trajectory, guide: Guide, arc_m: float) -> Way | None:
+        """The committed path from the request's start on, and then the guide; None where that is no way at all."""
+        path = committed.sample(committed.grid(committed.knot_interval_s / 2.0, request.start_s)).position_m
+        joined_m = guide.project(path[-1], arc_m, 2.0 * self.horizon_m)
+        after = guide.way.samples[guide.way.arc_m > joined_m + MERGED_M]
+        points = np.vstack((path, after[:, :3]))
+        arcs = arc_length(points)
+        distinct = np.concatenate(([True], np.diff(arcs) > MERGED_M))
+        if np.count_nonzero(distinct) < 2:
+            return None
+        legs = np.interp(arcs + arc_m, guide.way.arc_m, guide.way.samples[:, LEG_SPEED])
+        samples = np.column_stack((points, legs, np.full(len(arcs), self.limits.corridor_m)))
+        return Way(np.ascontiguousarray(samples[distinct]), np.ascontiguousarray(arcs[distinct]))

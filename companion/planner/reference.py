@@ -1,0 +1,196 @@
+"""The reference of a local plan: the guide from where the vehicle is, timed within the limits.
+
+It is what a plan would be if there were no splines: the guide's piece within the horizon, joined smoothly from the
+vehicle's place, passed at the nominal speeds. The search looks for trajectories around it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.planner.limits import FlightLimits, span, speed_limit
+from missions.kernels import compiled
+from missions.obstacles import Obstacles, clearance_at
+
+Array = npt.NDArray[np.float64]
+
+PATH_SAMPLES = 64
+JOIN_SLOPE = 6.0
+"""Who is beside the way joins it within this multiple of the distance, but not before a quarter of the plan."""
+PUSHES = 5
+PUSHED_FARTHER_M = 0.02
+PROBE_M = 0.01
+"""How the path is pushed off obstacles: rounds, what is added for the rounding between them, step of the slope."""
+SHORTEST_S = 1.0
+SLOWEST_M_S = 0.05
+"""A path is never timed slower than this between two samples, so that times stay finite at rest."""
+
+LEG_SPEED, CORRIDOR = 3, 4
+"""Columns of a way after its three coordinates: speed that is aimed at where the mission's speed rule allows it
+[m/s], and how far plans may deviate sideways [m]."""
+
+TANGENT, SPEED_CAP, WIDTH = 3, 6, 7
+"""Columns of a reference after its three coordinates: unit vector along the path (three, zero where it rests), the
+leg's own speed limit [m/s], the corridor [m]."""
+
+
+class Way(NamedTuple):
+    """A polyline to be flown along, as compiled code reads it."""
+
+    samples: Array
+    """(m, 5) ENU [m], LEG_SPEED, CORRIDOR."""
+    arc_m: Array
+    """(m,) distance along it from its beginning."""
+
+    @property
+    def points_m(self) -> Array:
+        """(m, 3) ENU [m]."""
+        return self.samples[:, :3]
+
+
+class Reference(NamedTuple):
+    """A timed way from the start to the goal."""
+
+    samples: Array
+    """(K + 1, 8) at equal time steps: ENU [m], TANGENT, SPEED_CAP, WIDTH."""
+    duration_s: float
+    length_m: float
+
+
+@compiled
+def lay_reference(
+    way: Way,
+    from_m: float,
+    to_m: float,
+    start: Array,
+    n_samples: int,
+    limits: FlightLimits,
+    obstacles: Obstacles,
+) -> Reference:
+    """Time the piece of `way` between two arcs, entered from a state.
+
+    Args:
+        way: what is followed.
+        from_m: arc [m] beside which the vehicle is.
+        to_m: arc [m] where the plan comes to rest.
+        start: (3, 3) position, velocity, acceleration; the offset from the way fades out along it.
+        n_samples: K + 1.
+        limits: of speed and acceleration.
+        obstacles: what the speed rule looks at.
+    """
+    path, aims = np.empty((PATH_SAMPLES, 5)), np.empty(PATH_SAMPLES)
+    arc, times = np.zeros(PATH_SAMPLES), np.zeros(PATH_SAMPLES)
+    follow(way, from_m, to_m, start, path)
+    keep_off(path, limits, obstacles)
+    for j in range(PATH_SAMPLES):
+        free_m = clearance_at(path[j, 0], path[j, 1], path[j, 2], obstacles)
+        aims[j] = min(path[j, LEG_SPEED], speed_limit(free_m, limits) * limits.nominal_ratio)
+        if j > 0:
+            arc[j] = arc[j - 1] + apart(path, j, j - 1)
+    reach_speeds(arc, aims, span(start[1, 0], start[1, 1], start[1, 2]), limits.braking_m_s2)
+    for j in range(1, PATH_SAMPLES):
+        times[j] = times[j - 1] + (arc[j] - arc[j - 1]) / max(0.5 * (aims[j] + aims[j - 1]), SLOWEST_M_S)
+    settling_s = limits.acceleration_m_s2 / limits.jerk_m_s3
+    duration_s = max(times[-1] + settling_s, SHORTEST_S)
+    samples = np.zeros((n_samples, 8))
+    sample_in_time(path, times, duration_s, limits.nominal_ratio, samples)
+    return Reference(samples, duration_s, arc[-1])
+
+
+@compiled
+def follow(way: Way, from_m: float, to_m: float, start: Array, path: Array) -> None:
+    """Sample a piece of `way` at equal arcs into `path` (n, 5), joined smoothly from the start's position."""
+    samples, arc_m = way.samples, way.arc_m
+    n, i, length_m = len(path), 0, to_m - from_m
+    for j in range(n):
+        at_m = from_m + length_m * j / (n - 1)
+        while i < len(arc_m) - 2 and arc_m[i + 1] < at_m:
+            i += 1
+        share = min(max((at_m - arc_m[i]) / max(arc_m[i + 1] - arc_m[i], 1e-9), 0.0), 1.0)
+        for column in range(5):
+            path[j, column] = samples[i, column] + share * (samples[i + 1, column] - samples[i, column])
+    off_east, off_north, off_up = start[0, 0] - path[0, 0], start[0, 1] - path[0, 1], start[0, 2] - path[0, 2]
+    joined_m = min(max(JOIN_SLOPE * span(off_east, off_north, off_up), 0.25 * length_m), length_m)
+    for j in range(n):
+        u = min(length_m * j / (n - 1) / max(joined_m, 1e-9), 1.0)
+        left = 1.0 - u * u * (3.0 - 2.0 * u)
+        path[j, 0] += left * off_east
+        path[j, 1] += left * off_north
+        path[j, 2] += left * off_up
+
+
+@compiled
+def keep_off(path: Array, limits: FlightLimits, obstacles: Obstacles) -> None:
+    """Push a path (n, 5) out to the avoidance distance where it lacks less of it than the corridor is wide.
+
+    Passing an obstacle a little farther off at full speed is better than passing it slowly.
+    """
+    n = len(path)
+    pushed, moved = np.zeros((n, 3)), path.copy()
+    for _ in range(PUSHES):
+        for j in range(1, n - 1):
+            free_m = clearance_at(moved[j, 0], moved[j, 1], moved[j, 2], obstacles)
+            lack_m = limits.avoidance_distance_m + PUSHED_FARTHER_M - free_m
+            if 0.0 < lack_m < path[j, CORRIDOR]:
+                for axis in range(3):
+                    moved[j, axis] += PROBE_M
+                    slope = (clearance_at(moved[j, 0], moved[j, 1], moved[j, 2], obstacles) - free_m) / PROBE_M
+                    moved[j, axis] -= PROBE_M
+                    pushed[j, axis] += slope * lack_m
+        for axis in range(3):
+            before = 0.0
+            for j in range(1, n - 1):
+                smooth = 0.25 * before + 0.5 * pushed[j, axis] + 0.25 * pushed[j + 1, axis]
+                before = pushed[j, axis]
+                pushed[j, axis] = smooth
+                moved[j, axis] = path[j, axis] + smooth
+    for j in range(n):
+        for axis in range(3):
+            path[j, axis] = moved[j, axis]
+
+
+@compiled
+def reach_speeds(arc_m: Array, speeds_m_s: Array, start_m_s: float, braking_m_s2: float) -> None:
+    """Cut the (n,) speeds along a path to what acceleration and braking allow from `start_m_s` to rest.
+
+    Who starts faster than it may brakes as hard as it can.
+    """
+    n, first = len(arc_m), start_m_s * start_m_s
+    for j in range(n):
+        speeds_m_s[j] *= speeds_m_s[j]
+    speeds_m_s[0], speeds_m_s[n - 1] = min(speeds_m_s[0], first), 0.0
+    for j in range(1, n):
+        speeds_m_s[j] = min(speeds_m_s[j], speeds_m_s[j - 1] + 2.0 * braking_m_s2 * (arc_m[j] - arc_m[j - 1]))
+    for j in range(n - 2, -1, -1):
+        speeds_m_s[j] = min(speeds_m_s[j], speeds_m_s[j + 1] + 2.0 * braking_m_s2 * (arc_m[j + 1] - arc_m[j]))
+    for j in range(n):
+        slowest = 0.0 if j == n - 1 else first - 2.0 * braking_m_s2 * arc_m[j]
+        speeds_m_s[j] = np.sqrt(max(speeds_m_s[j], slowest))
+
+
+@compiled
+def sample_in_time(path: Array, times_s: Array, duration_s: float, nominal_ratio: float, samples: Array) -> None:
+    """Fill `samples` (K + 1, 8) from a path (n, 5) that is passed at (n,) times; it rests in its end."""
+    n, j = len(samples), 0
+    for k in range(n):
+        time_s = min(duration_s * k / (n - 1), times_s[-1])
+        while j < len(path) - 2 and times_s[j + 1] < time_s:
+            j += 1
+        share = (time_s - times_s[j]) / max(times_s[j + 1] - times_s[j], 1e-9)
+        for axis in range(3):
+            samples[k, axis] = path[j, axis] + share * (path[j + 1, axis] - path[j, axis])
+        samples[k, SPEED_CAP] = max(path[j, LEG_SPEED], path[j + 1, LEG_SPEED]) / nominal_ratio
+        samples[k, WIDTH] = path[j, CORRIDOR] + share * (path[j + 1, CORRIDOR] - path[j, CORRIDOR])
+    for k in range(n):
+        ahead, behind = min(k + 1, n - 1), max(k - 1, 0)
+        length_m = apart(samples, ahead, behind)
+        for axis in range(3):
+            along_m = samples[ahead, axis] - samples[behind, axis]
+            samples[k, TANGENT + axis] = along_m / length_m if length_m > 1e-6 else 0.0
+
+
+@compiled
+def apart(points_m: Array, i: int, j: int) -> float:
+    """Distance between the i-th and the j-th point of (m, 3 or more)."""
+    return span(points_m[i, 0] - points_m[j, 0], points_m[i, 1] - points_m[j, 1], points_m[i, 2] - points_m[j, 2])
