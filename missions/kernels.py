@@ -1,17 +1,31 @@
-"""Compiled functions: how they are declared, and how a fleet of processes compiles them only once."""
+"""Compiled functions: how they are declared, and how a fleet of processes compiles them only once.
+
+Machine code is kept beside its source. numba throws it away when that source changes, but not when a function or a
+constant that it has taken in from another module does; here it does so as well.
+"""
 
 import fcntl
+import functools
 import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import config, njit
+from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+ROOT = Path(__file__).parent.parent
+"""Where the project's packages lie side by side."""
+
+_IMPORT = re.compile(
+    r"^\s*(?:from|import)\s+((?:missions|gcs|companion|sitl)[\w.]*)(?:\s+import\s+(.*))?$", re.MULTILINE
+)
 
 
 def compiled(function: F) -> F:
@@ -29,6 +43,58 @@ def compiled(function: F) -> F:
 def inlined(function: F) -> F:
     """As `compiled`, for the small helpers that other compiled functions call in their inner loops."""
     return cast(F, njit(cache=True, inline="always", error_model="numpy")(function))
+
+
+def sources_of(module: Path) -> set[Path]:
+    """The files whose change may change what `module` compiles to: itself, and all of ours that it imports."""
+    found: set[Path] = set()
+    waiting = {module.resolve()}
+    while waiting:
+        path = waiting.pop()
+        found.add(path)
+        waiting |= _imported(path) - found
+    return found
+
+
+@functools.cache
+def _imported(path: Path) -> frozenset[Path]:
+    """The project's files that one file imports itself."""
+    names: set[str] = set()
+    for package, items in _IMPORT.findall(path.read_text(encoding="utf-8")):
+        names |= {package, *(f"{package}.{item}" for item in re.findall(r"\w+", items))}
+    stems = [ROOT.joinpath(*name.split(".")) for name in names]
+    candidates = [stem.with_suffix(".py") for stem in stems] + [stem / "__init__.py" for stem in stems]
+    return frozenset(candidate for candidate in candidates if candidate.is_file())
+
+
+@functools.cache
+def _stamp(py_file: str) -> bytes:
+    """A digest of all `sources_of` a module."""
+    contents = b"".join(path.read_bytes() for path in sorted(sources_of(Path(py_file))))
+    return hashlib.sha256(contents).digest()
+
+
+class _StampedWithImports:
+    """A cache locator whose stamp covers a module's imports."""
+
+    _py_file: str
+
+    def get_source_stamp(self) -> bytes:
+        return _stamp(self._py_file)
+
+
+class KernelsBesideSource(_StampedWithImports, InTreeCacheLocator):
+    """In `__pycache__`, where that can be written."""
+
+
+class KernelsOfUser(_StampedWithImports, UserWideCacheLocator):
+    """In the user's cache directory otherwise."""
+
+
+_LOCATORS = (KernelsBesideSource, KernelsOfUser)
+config.CACHE_LOCATOR_CLASSES = ",".join(  # pyright: ignore[reportAttributeAccessIssue]
+    f"{__name__}.{locator.__name__}" for locator in _LOCATORS
+)
 
 
 @contextmanager
