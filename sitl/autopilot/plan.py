@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 
 from missions.mission_items import MissionItem
 
@@ -74,7 +75,7 @@ class Plan:
 
     items: tuple[MissionItem, ...] = ()
 
-    @property
+    @cached_property
     def plan_id(self) -> int:
         """CRC-32 over all content; equal plans have equal ids, and nothing has 0."""
         return zlib.crc32(b"".join(_content(self.items))) if self.items else 0

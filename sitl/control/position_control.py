@@ -10,13 +10,14 @@ from typing import Any
 from missions.kernels import compiled
 from sitl.dynamics.airframe import GRAVITY_M_S2
 from sitl.dynamics.rotation import from_z_and_yaw, yaw_of
-from sitl.dynamics.state import TakeoffStage
+from sitl.dynamics.state import Guidance, TakeoffStage
 
 TILT_SLEW_RAD_S = 0.2
 LEAST_THRUST = 1e-3
 """A thrust vector is never shorter than this, so that an attitude can be read off it."""
 
 _READY, _RAMPUP, _FLIGHT = int(TakeoffStage.READY), int(TakeoffStage.RAMPUP), int(TakeoffStage.FLIGHT)
+_WAYPOINT, _LAND = int(Guidance.WAYPOINT), int(Guidance.LAND)
 
 
 @compiled
@@ -104,7 +105,8 @@ def _command_velocity(v: Any, g: Any, up_m_s: float) -> None:
     if not math.isnan(v.commanded_velocity_m_s[0]):
         _limit_horizontal_velocity(v, g)
     if not math.isnan(v.commanded_velocity_m_s[2]):
-        down_m_s = max(g.MPC_Z_VEL_MAX_DN, 1.2 * g.MPC_Z_V_AUTO_DN)
+        auto = v.guidance == _WAYPOINT or v.guidance == _LAND  # its own speeds leave room for corrections
+        down_m_s = max(g.MPC_Z_VEL_MAX_DN, 1.2 * g.MPC_Z_V_AUTO_DN) if auto else g.MPC_Z_VEL_MAX_DN
         v.commanded_velocity_m_s[2] = min(max(v.commanded_velocity_m_s[2], -up_m_s), down_m_s)
 
 
