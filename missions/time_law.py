@@ -31,11 +31,11 @@ def speeds_along(
     steps_m = np.linalg.norm(np.diff(points_m, axis=0), axis=1)
     squared = np.asarray(limit_m_s, dtype=float) ** 2
     squared[0], squared[-1] = min(squared[0], start_m_s**2), min(squared[-1], end_m_s**2)
-    for i, step_m in enumerate(steps_m):
-        squared[i + 1] = min(squared[i + 1], squared[i] + 2.0 * acceleration_m_s2 * step_m)
-    for i in range(len(steps_m) - 1, -1, -1):
-        squared[i] = min(squared[i], squared[i + 1] + 2.0 * acceleration_m_s2 * steps_m[i])
-    return np.sqrt(squared)
+    gained = 2.0 * acceleration_m_s2 * np.concatenate(([0.0], np.cumsum(steps_m)))
+    squared = gained + np.minimum.accumulate(squared - gained)  # v^2 grows by 2 a s at most
+    lost = gained[-1] - gained
+    squared = lost + np.minimum.accumulate((squared - lost)[::-1])[::-1]
+    return np.sqrt(np.maximum(squared, 0.0))
 
 
 def times_along(points_m: Array, speed_m_s: Array) -> Array:

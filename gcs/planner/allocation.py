@@ -5,7 +5,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from gcs.planner.fleet_cost import Problem, no_others, swarm_cost
-from gcs.planner.problem import Route, pose, straight_guides
+from gcs.planner.problem import Route, guides, pose
 from gcs.planner.representation import bows
 from missions.errors import InfeasibleMission
 from missions.mission import Mission, Target
@@ -41,7 +41,7 @@ def path_costs(mission: Mission) -> Array:
     costs = np.empty((len(mission.vehicles), len(mission.targets)))
     for row, vehicle in enumerate(mission.vehicles):
         routes = [Route(vehicle.name, vehicle.sysid, mission.start_m(vehicle), target) for target in mission.targets]
-        problem = pose(mission, routes, straight_guides(mission, routes))
+        problem = pose(mission, routes, guides(mission, routes))
         costs[row] = [_best_alone(problem, index) for index in range(len(routes))]
     return costs
 

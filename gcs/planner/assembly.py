@@ -7,13 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.planner import feasibility
-from gcs.planner.curves import dense_curves
+from gcs.planner.curves import dense_curves, path_lengths
 from gcs.planner.objective import objective
-from gcs.planner.plan import VehiclePlan, Violation
+from gcs.planner.plan import TimedCurve, VehiclePlan, Violation
 from gcs.planner.problem import Route
-from gcs.planner.timing import common_timing
+from gcs.planner.timing import Timing, common_timing
 from gcs.planner.track_points import sample_track
-from missions import time_law
+from missions import obstacles
 from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
@@ -23,25 +23,37 @@ Array = npt.NDArray[np.float64]
 class Candidate:
     """A plan with its objective (eq. 13) and the judge's verdict."""
 
-    vehicles: tuple[VehiclePlan, ...]
+    curves: tuple[TimedCurve, ...]
+    timing: Timing
     objective: float
     violations: tuple[Violation, ...]
 
 
-def assemble(mission: Mission, routes: Sequence[Route], controls_m: Array) -> Candidate:
-    """Dense curves, times, tracks and verdict for (vehicles, n, 3) control points, ENU [m]."""
+def judged(mission: Mission, routes: Sequence[Route], controls_m: Array) -> Candidate:
+    """Dense curves, times and verdict for (vehicles, n, 3) control points, ENU [m]."""
     curves_m = dense_curves(controls_m, feasibility.SPACING_M[mission.site])
-    timing = common_timing(mission, curves_m)
-    vehicles = tuple(
-        VehiclePlan(
-            name=route.name,
-            sysid=route.sysid,
-            target=route.target,
-            curve_m=curve_m,
-            times_s=timing.times_s,
-            track=sample_track(mission, curve_m, timing),
-            length_m=float(time_law.arc_length(curve_m)[-1]),
-        )
+    solid = obstacles.pack(mission.world.as_known())
+    clearance_m = np.array([obstacles.clearance(curve_m, solid) for curve_m in curves_m])
+    timing = common_timing(mission, curves_m, clearance_m)
+    curves = tuple(
+        TimedCurve(route.name, route.sysid, route.target, curve_m, timing.times_s)
         for route, curve_m in zip(routes, curves_m, strict=True)
     )
-    return Candidate(vehicles, objective(mission, curves_m), feasibility.violations(mission, vehicles))
+    found = feasibility.violations(mission, curves)
+    return Candidate(curves, timing, objective(mission, curves_m, clearance_m), found)
+
+
+def vehicle_plans(mission: Mission, candidate: Candidate) -> tuple[VehiclePlan, ...]:
+    """What is handed out: the curves, and the tracks sampled from them."""
+    return tuple(
+        VehiclePlan(
+            name=curve.name,
+            sysid=curve.sysid,
+            target=curve.target,
+            curve_m=curve.curve_m,
+            times_s=curve.times_s,
+            track=sample_track(mission, curve.curve_m, candidate.timing),
+            length_m=float(path_lengths(curve.curve_m)),
+        )
+        for curve in candidate.curves
+    )

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-DEFAULT_EVALUATIONS = 3000
+DEFAULT_EVALUATIONS = 1500
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.planner.ecpso import Ecpso, EcpsoSettings
-from gcs.planner.fleet_cost import Context, Problem, set_context, swarm_cost
+from gcs.planner.fleet_cost import Problem, no_others, set_context, swarm_cost
 from gcs.planner.representation import bows, fresh_bows
 
 Array = npt.NDArray[np.float64]
@@ -23,7 +23,7 @@ class Cooperation:
     """
 
     def __init__(self, problem: Problem, settings: EcpsoSettings, rng: np.random.Generator) -> None:
-        self.problem, self._settings = problem, settings
+        self.problem, self._settings, self._rng = problem, settings, rng
         n_vehicles, n_control = problem.base_m.shape[:2]
         self.offsets = np.zeros((n_vehicles, 2 * (n_control - 2)))
         self.curve_evaluations = 0
@@ -33,9 +33,7 @@ class Cooperation:
             return fresh_bows(generator, count, n_control)
 
         self._swarms = [Ecpso(self._first, fresh, settings, generator) for generator in rng.spawn(n_vehicles)]
-        self._context = Context(
-            np.zeros((n_vehicles, len(problem.coupling.first), 3)), np.zeros((n_vehicles, n_vehicles))
-        )
+        self._context = no_others(n_vehicles, len(problem.coupling.first))
         self._enter_all()
 
     def start(self) -> None:
@@ -55,6 +53,20 @@ class Cooperation:
             position, cost = swarm.best()
             if cost < present:
                 self._enter(vehicle, position)
+
+    def again(self, problem: Problem) -> "Cooperation":
+        """New swarms for other variables; what was spent so far still counts."""
+        afresh = Cooperation(problem, self._settings, self._rng)
+        afresh.curve_evaluations = self.curve_evaluations
+        return afresh
+
+    def violations_alone(self, offsets: Array) -> Array:
+        """(vehicles,) sums of squared violations of a plan, (vehicles, d), without those between vehicles."""
+        objective, violation = np.empty(len(offsets)), np.empty(len(offsets))
+        for vehicle in range(len(offsets)):
+            row = slice(vehicle, vehicle + 1)
+            swarm_cost(self.problem, vehicle, offsets[row], no_others(), objective[row], violation[row])
+        return violation
 
     def pose(self, problem: Problem) -> None:
         """Go on with the same variables, but other limits."""

@@ -12,13 +12,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import BSpline
 
-from gcs.planner.obstacle_gradient import clearance_gradient_at, height_gradient_at
+from gcs.planner.obstacle_gradient import clearances, heights
 from missions import bspline
 from missions.kernels import compiled
 from missions.obstacles import Obstacles
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+Corner = tuple[float, float, float]
 
 LEAST_SLOPE_M = 1e-6
 """Where a curve stands still it has no direction: its derivative is taken to be at least this long."""
@@ -65,9 +66,9 @@ class Terms(NamedTuple):
     """Longest path."""
     unit_m: float
     """A violation of this size [m] counts as one."""
-    low_m: Array
-    """(3,) lowest corner of what may be flown in."""
-    high_m: Array
+    low_m: Corner
+    """Lowest corner of what may be flown in."""
+    high_m: Corner
 
 
 class Adjoint(NamedTuple):
@@ -117,34 +118,45 @@ def curve_cost(
     """
     n_samples = len(points_m)
     length = place_samples(control_m, samples, points_m, chords_m)
+    clearance, height, reward = np.empty((n_samples, 4)), np.empty((n_samples, 4)), np.empty((n_samples, 4))
+    clearances(points_m, obstacles, terms.look_m, clearance)
+    heights(points_m, obstacles, height)
     over = max(0.0, length / terms.length_m - 1.0)
-    violation, earned = over * over, 0.0
-    reward, shape = np.empty((n_samples, 4)), np.empty((2, 3))
-    for m in range(n_samples):
-        violation += _at_point(m, control_m, terms, obstacles, points_m, reward, adjoint, with_gradient)
-        _weigh(control_m, samples.first[m], samples.slope[m], shape[0])
-        _weigh(control_m, samples.first[m], samples.bend[m], shape[1])
-        violation += _of_shape(m, shape, terms, adjoint, with_gradient)
-        before, after = chords_m[max(m - 1, 0)] * (m > 0), chords_m[min(m, n_samples - 2)] * (m < n_samples - 1)
-        earned += 0.5 * (before + after) * reward[m, 0]
-        if with_gradient:
-            for axis in range(3):
-                adjoint.point[m, axis] -= 0.5 * (before + after) / length * reward[m, 1 + axis]
+    violation = over * over
+    violation += _judge_points(points_m, terms, clearance, height, reward, adjoint.point, with_gradient)
+    violation += _judge_shape(control_m, samples, terms, adjoint.slope, adjoint.bend, with_gradient)
+    earned = 0.0
+    for m in range(n_samples - 1):
+        earned += 0.5 * chords_m[m] * (reward[m, 0] + reward[m + 1, 0])
     if with_gradient:
         by_length = terms.length_weight + earned / length**2 + terms.penalty_weight * 2.0 * over / terms.length_m
         for m in range(n_samples - 1):
+            share = 0.5 * chords_m[m] / length
             adjoint.chord[m] = by_length - 0.5 * (reward[m, 0] + reward[m + 1, 0]) / length
+            for axis in range(3):
+                adjoint.point[m, axis] -= share * reward[m, 1 + axis]
+                adjoint.point[m + 1, axis] -= share * reward[m + 1, 1 + axis]
     return terms.length_weight * length - earned / length, violation
 
 
 @compiled
 def place_samples(control_m: Array, samples: Sampling, points_m: Array, chords_m: Array) -> float:
     """Fill `points_m` and `chords_m` as `curve_cost` says, and return the length [m] of the polygon."""
+    first, position = samples.first, samples.position
     length = 0.0
     for m in range(len(points_m)):
-        _weigh(control_m, samples.first[m], samples.position[m], points_m[m])
+        c = first[m]
+        for axis in range(3):
+            points_m[m, axis] = (
+                position[m, 0] * control_m[c, axis]
+                + position[m, 1] * control_m[c + 1, axis]
+                + position[m, 2] * control_m[c + 2, axis]
+                + position[m, 3] * control_m[c + 3, axis]
+            )
         if m > 0:
-            chords_m[m - 1] = distance(points_m[m - 1], points_m[m])
+            east, north = points_m[m, 0] - points_m[m - 1, 0], points_m[m, 1] - points_m[m - 1, 1]
+            up = points_m[m, 2] - points_m[m - 1, 2]
+            chords_m[m - 1] = np.sqrt(east * east + north * north + up * up)
             length += chords_m[m - 1]
     return length
 
@@ -152,103 +164,101 @@ def place_samples(control_m: Array, samples: Sampling, points_m: Array, chords_m
 @compiled
 def pull_back(samples: Sampling, points_m: Array, chords_m: Array, adjoint: Adjoint, gradient: Array) -> None:
     """Fill (n, 3) `gradient` with the derivatives by the control points that an adjoint amounts to."""
-    gradient[:] = 0.0
+    by_point, by_slope, by_bend, by_chord = adjoint.point, adjoint.slope, adjoint.bend, adjoint.chord
     for m in range(len(chords_m)):
-        scale = adjoint.chord[m] / max(chords_m[m], LEAST_SLOPE_M)
+        scale = by_chord[m] / max(chords_m[m], LEAST_SLOPE_M)
         for axis in range(3):
             pull = scale * (points_m[m + 1, axis] - points_m[m, axis])
-            adjoint.point[m + 1, axis] += pull
-            adjoint.point[m, axis] -= pull
+            by_point[m + 1, axis] += pull
+            by_point[m, axis] -= pull
+    first, position, slope, bend = samples.first, samples.position, samples.slope, samples.bend
+    gradient[:] = 0.0
     for m in range(len(points_m)):
         for k in range(4):
-            position, slope, bend = samples.position[m, k], samples.slope[m, k], samples.bend[m, k]
             for axis in range(3):
-                gradient[samples.first[m] + k, axis] += (
-                    position * adjoint.point[m, axis] + slope * adjoint.slope[m, axis] + bend * adjoint.bend[m, axis]
+                gradient[first[m] + k, axis] += (
+                    position[m, k] * by_point[m, axis] + slope[m, k] * by_slope[m, axis] + bend[m, k] * by_bend[m, axis]
                 )
 
 
 @compiled
-def _weigh(control_m: Array, first: int, weights: Array, out: Array) -> None:
-    for axis in range(3):
-        out[axis] = (
-            weights[0] * control_m[first, axis]
-            + weights[1] * control_m[first + 1, axis]
-            + weights[2] * control_m[first + 2, axis]
-            + weights[3] * control_m[first + 3, axis]
-        )
-
-
-@compiled
-def distance(a: Array, b: Array) -> float:
-    """Euclidean distance of two (3,) points."""
-    east, north, up = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return np.sqrt(east * east + north * north + up * up)
-
-
-@compiled
-def _at_point(
-    m: int,
-    control_m: Array,
-    terms: Terms,
-    obstacles: Obstacles,
+def _judge_points(
     points_m: Array,
+    terms: Terms,
+    clearance: Array,
+    height: Array,
     reward: Array,
-    adjoint: Adjoint,
+    by_point: Array,
     with_gradient: bool,
 ) -> float:
-    """Reward of eq. 13 at a sample, with its gradient, into `reward[m]`; squared violations of what points keep."""
-    point = points_m[m]
-    clearance = clearance_gradient_at(point[0], point[1], point[2], obstacles, terms.look_m)
-    height = height_gradient_at(point[0], point[1], point[2], obstacles)
-    in_zone = min(distance(point, control_m[0]), distance(point, control_m[-1])) < terms.zone_radius_m
-    short = max(0.0, (terms.contact_m if in_zone else terms.clearance_m) - clearance[0]) / terms.unit_m
-    low = max(0.0, (0.0 if in_zone else terms.height_m) - height[0]) / terms.unit_m
-    slow, by_slow = _slowness(clearance[0], terms)
-    by_clearance = terms.clearance_weight * (clearance[0] < terms.clearance_cap_m) - by_slow
-    by_height = terms.height_weight * (height[0] < terms.height_cap_m)
-    reward[m, 0] = (
-        terms.clearance_weight * min(clearance[0], terms.clearance_cap_m)
-        + terms.height_weight * min(height[0], terms.height_cap_m)
-        - slow
-    )
-    violation = short * short + low * low
-    push = -2.0 * terms.penalty_weight / terms.unit_m
-    for axis in range(3):
-        out = max(0.0, point[axis] - terms.high_m[axis]) - max(0.0, terms.low_m[axis] - point[axis])
-        violation += (out / terms.unit_m) ** 2
-        if with_gradient:
-            reward[m, 1 + axis] = by_clearance * clearance[1 + axis] + by_height * height[1 + axis]
-            adjoint.point[m, axis] = push * (short * clearance[1 + axis] + low * height[1 + axis] - out / terms.unit_m)
+    """Squared violations of clearance, height and bounds, with (m, 3) derivatives; fills (m, 4) rewards of eq. 13."""
+    last, violation, unit_m = len(points_m) - 1, 0.0, terms.unit_m
+    push = 2.0 * terms.penalty_weight / unit_m
+    zone_squared = terms.zone_radius_m * terms.zone_radius_m
+    for m in range(last + 1):
+        from_start = from_target = 0.0
+        for axis in range(3):
+            from_start += (points_m[m, axis] - points_m[0, axis]) ** 2
+            from_target += (points_m[m, axis] - points_m[last, axis]) ** 2
+        in_zone = min(from_start, from_target) < zone_squared
+        short = max(0.0, (terms.contact_m if in_zone else terms.clearance_m) - clearance[m, 0]) / unit_m
+        low = max(0.0, (0.0 if in_zone else terms.height_m) - height[m, 0]) / unit_m
+        violation += short * short + low * low
+        slow, by_slow = _slowness(clearance[m, 0], terms.slow_cost, terms.slow_m, terms.cruise_m)
+        reward[m, 0] = terms.clearance_weight * min(clearance[m, 0], terms.clearance_cap_m) - slow
+        reward[m, 0] += terms.height_weight * min(height[m, 0], terms.height_cap_m)
+        by_clearance = terms.clearance_weight * (clearance[m, 0] < terms.clearance_cap_m) - by_slow
+        by_height = terms.height_weight * (height[m, 0] < terms.height_cap_m)
+        for axis in range(3):
+            above, below = points_m[m, axis] - terms.high_m[axis], terms.low_m[axis] - points_m[m, axis]
+            out = (max(0.0, above) - max(0.0, below)) / unit_m
+            violation += out * out
+            if with_gradient:
+                reward[m, 1 + axis] = by_clearance * clearance[m, 1 + axis] + by_height * height[m, 1 + axis]
+                by_point[m, axis] = push * (out - short * clearance[m, 1 + axis] - low * height[m, 1 + axis])
     return violation
 
 
 @compiled
-def _slowness(clearance_m: float, terms: Terms) -> tuple[float, float]:
+def _slowness(clearance_m: float, slow_cost: float, slow_m: float, cruise_m: float) -> tuple[float, float]:
     """What flying with this clearance costs in time, and its derivative: a smooth step from all to nothing."""
-    if clearance_m >= terms.cruise_m:
+    if clearance_m >= cruise_m:
         return 0.0, 0.0
-    width = max(terms.cruise_m - terms.slow_m, 1e-9)
-    t = min((terms.cruise_m - clearance_m) / width, 1.0)
-    return terms.slow_cost * t * t * (3.0 - 2.0 * t), -terms.slow_cost * 6.0 * t * (1.0 - t) / width
+    width = max(cruise_m - slow_m, 1e-9)
+    t = min((cruise_m - clearance_m) / width, 1.0)
+    return slow_cost * t * t * (3.0 - 2.0 * t), -slow_cost * 6.0 * t * (1.0 - t) / width
 
 
 @compiled
-def _of_shape(m: int, shape: Array, terms: Terms, adjoint: Adjoint, with_gradient: bool) -> float:
-    """Squared violations of turn radius and climb angle at a sample with first and second derivative `shape`."""
-    d, b = shape[0], shape[1]
-    speed = max(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), LEAST_SLOPE_M)
-    cross = (d[1] * b[2] - d[2] * b[1], d[2] * b[0] - d[0] * b[2], d[0] * b[1] - d[1] * b[0])
-    bent = max(np.sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]), 1e-12)
-    tight = max(0.0, terms.turn_radius_m * bent / speed**3 - 1.0)
-    steep = max(0.0, abs(d[2]) / speed / terms.climb_sine - 1.0)
-    if with_gradient:
-        by_tight = 2.0 * terms.penalty_weight * tight * terms.turn_radius_m / (bent * speed**3)
-        by_steep = 2.0 * terms.penalty_weight * steep / (terms.climb_sine * speed)
-        along = -3.0 * by_tight * bent * bent / speed**2 - by_steep * abs(d[2]) / speed**2
+def _judge_shape(
+    control_m: Array, samples: Sampling, terms: Terms, by_slope: Array, by_bend: Array, with_gradient: bool
+) -> float:
+    """Squared violations of turn radius and climb angle, with (m, 3) derivatives."""
+    first, slope, bend, violation = samples.first, samples.slope, samples.bend, 0.0
+    radius_m, climb_sine = terms.turn_radius_m, terms.climb_sine
+    d, b, cross = np.empty(3), np.empty(3), np.empty(3)
+    for m in range(len(first)):
+        c = first[m]
+        for axis in range(3):
+            d[axis] = b[axis] = 0.0
+            for k in range(4):
+                d[axis] += slope[m, k] * control_m[c + k, axis]
+                b[axis] += bend[m, k] * control_m[c + k, axis]
         for axis in range(3):
             i, j = (axis + 1) % 3, (axis + 2) % 3
-            adjoint.bend[m, axis] = by_tight * (cross[i] * d[j] - cross[j] * d[i])
-            adjoint.slope[m, axis] = by_tight * (b[i] * cross[j] - b[j] * cross[i]) + along * d[axis]
-        adjoint.slope[m, 2] += by_steep * np.sign(d[2])
-    return tight * tight + steep * steep
+            cross[axis] = d[i] * b[j] - d[j] * b[i]
+        speed = max(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), LEAST_SLOPE_M)
+        bent = max(np.sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]), 1e-12)
+        tight = max(0.0, radius_m * bent / speed**3 - 1.0)
+        steep = max(0.0, abs(d[2]) / speed / climb_sine - 1.0)
+        violation += tight * tight + steep * steep
+        if with_gradient:
+            by_tight = 2.0 * terms.penalty_weight * tight * radius_m / (bent * speed**3)
+            by_steep = 2.0 * terms.penalty_weight * steep / (climb_sine * speed)
+            along = -3.0 * by_tight * bent * bent / speed**2 - by_steep * abs(d[2]) / speed**2
+            for axis in range(3):
+                i, j = (axis + 1) % 3, (axis + 2) % 3
+                by_bend[m, axis] = by_tight * (cross[i] * d[j] - cross[j] * d[i])
+                by_slope[m, axis] = by_tight * (b[i] * cross[j] - b[j] * cross[i]) + along * d[axis]
+            by_slope[m, 2] += by_steep * np.sign(d[2])
+    return violation

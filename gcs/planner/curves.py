@@ -1,4 +1,4 @@
-"""From control points to dense curves: samples equally spaced along every curve, as many for all vehicles."""
+"""Dense curves: samples equally spaced along every vehicle's curve, as many for all; and what is measured on them."""
 
 import numpy as np
 import numpy.typing as npt
@@ -14,8 +14,8 @@ SPARE = 0.99
 """Samples lie at most this share of the allowed spacing apart."""
 
 
-def dense_curves(controls_m: Array, spacing_m: float) -> list[Array]:
-    """(m, 3) samples of each curve at equal steps of its length, at most `spacing_m` apart on the longest one.
+def dense_curves(controls_m: Array, spacing_m: float) -> Array:
+    """(vehicles, m, 3) samples of all curves at equal steps along each, at most `spacing_m` apart on the longest.
 
     Args:
         controls_m: (vehicles, n, 3) control points, ENU [m].
@@ -23,13 +23,41 @@ def dense_curves(controls_m: Array, spacing_m: float) -> list[Array]:
     """
     u = np.linspace(0.0, 1.0, TABLE)
     rows = bspline.sampled_basis(controls_m.shape[1], TABLE)
-    lengths_m = [time_law.arc_length(rows @ control_m) for control_m in controls_m]
-    longest_m = max(length_m[-1] for length_m in lengths_m)
+    flown_m = [time_law.arc_length(rows @ control_m) for control_m in controls_m]
+    longest_m = max(float(along_m[-1]) for along_m in flown_m)
     count = max(int(np.ceil(longest_m / (SPARE * spacing_m))) + 1, 3)
-    knots, curves = bspline.clamped_knots(controls_m.shape[1]), []
-    for control_m, length_m in zip(controls_m, lengths_m, strict=True):
-        at = np.interp(np.linspace(0.0, length_m[-1], count), length_m, u)
-        curve_m = BSpline(knots, control_m, bspline.DEGREE)(at)
+    knots = bspline.clamped_knots(controls_m.shape[1])
+    curves_m = np.empty((len(controls_m), count, 3))
+    for curve_m, control_m, along_m in zip(curves_m, controls_m, flown_m, strict=True):
+        curve_m[:] = BSpline(knots, control_m, bspline.DEGREE)(
+            np.interp(np.linspace(0.0, along_m[-1], count), along_m, u)
+        )
         curve_m[0], curve_m[-1] = control_m[0], control_m[-1]
-        curves.append(curve_m)
-    return curves
+    return curves_m
+
+
+def path_lengths(curves_m: Array) -> Array:
+    """(...,) lengths [m] of (..., m, 3) curves."""
+    return lengths(np.diff(curves_m, axis=-2)).sum(axis=-1)
+
+
+def lengths(vectors: Array) -> Array:
+    """(...,) Euclidean lengths of (..., 3) vectors; several times as fast as `numpy.linalg.norm` along an axis."""
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+
+
+def curvature(curve_m: Array) -> Array:
+    """(m,) curvature [1/m] of a densely sampled (m, 3) curve: of the circle through each sample and its neighbours."""
+    steps = np.diff(curve_m, axis=0)
+    before, after = steps[:-1], steps[1:]
+    step_m = lengths(steps)
+    doubled_area = lengths(np.cross(before, after))
+    inner = 2.0 * doubled_area / np.maximum(step_m[:-1] * step_m[1:] * lengths(before + after), 1e-12)
+    return np.concatenate((inner[:1], inner, inner[-1:]))
+
+
+def distances_to_segment(points_m: Array, begin_m: Array, end_m: Array) -> Array:
+    """(n,) distances of (n, 3) points to the straight segment between two (3,) points."""
+    leg = end_m - begin_m
+    along = np.clip((points_m - begin_m) @ leg / max(float(leg @ leg), 1e-12), 0.0, 1.0)
+    return lengths(points_m - begin_m - along[:, None] * leg)

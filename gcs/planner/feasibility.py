@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gcs.planner.curves import curvature, lengths, path_lengths
 from gcs.planner.limits import flight_box, join_distance_m
-from gcs.planner.plan import Limit, VehiclePlan, Violation
-from gcs.planner.timing import curvature
+from gcs.planner.plan import Limit, TimedCurve, Violation
 from missions import obstacles
 from missions.mission import Mission, Site
 
@@ -44,7 +44,7 @@ class _Fleet:
     near_end: BoolArray
 
 
-def violations(mission: Mission, vehicles: Sequence[VehiclePlan]) -> tuple[Violation, ...]:
+def violations(mission: Mission, vehicles: Sequence[TimedCurve]) -> tuple[Violation, ...]:
     """Everything that is wrong with a plan: the worst breach of each limit by each vehicle or pair of vehicles.
 
     Raises:
@@ -64,24 +64,24 @@ def violations(mission: Mission, vehicles: Sequence[VehiclePlan]) -> tuple[Viola
     return tuple(found)
 
 
-def _assemble(mission: Mission, vehicles: Sequence[VehiclePlan]) -> _Fleet:
+def _assemble(mission: Mission, vehicles: Sequence[TimedCurve]) -> _Fleet:
     times_s, spacing_m = vehicles[0].times_s, SPACING_M[mission.site]
     for vehicle in vehicles:
         if not np.array_equal(vehicle.times_s, times_s):
             raise ValueError(f"the samples of {vehicle.name}'s curve are not at the times of {vehicles[0].name}'s")
-        apart_m = float(np.linalg.norm(np.diff(vehicle.curve_m, axis=0), axis=1).max())
+        apart_m = float(lengths(np.diff(vehicle.curve_m, axis=0)).max())
         if apart_m > spacing_m:
             raise ValueError(
                 f"samples of {vehicle.name}'s curve: {apart_m:.3g} m apart, expected at most {spacing_m:g} m"
             )
     places_m = np.array([vehicle.curve_m for vehicle in vehicles])
-    flown_m = np.linalg.norm(places_m - places_m[:, :1], axis=-1)
-    ahead_m = np.linalg.norm(places_m - places_m[:, -1:], axis=-1)
+    flown_m = lengths(places_m - places_m[:, :1])
+    ahead_m = lengths(places_m - places_m[:, -1:])
     radius_m = mission.launch_zone_radius_m
     return _Fleet(places_m, times_s, flown_m < radius_m, flown_m > join_distance_m(mission), ahead_m < radius_m)
 
 
-def _ends(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
+def _ends(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
     ends = (
         (Limit.START, vehicle.curve_m[0], mission.start_m(mission.vehicle(vehicle.sysid))),
         (Limit.TARGET, vehicle.curve_m[-1], np.array(vehicle.target.position_m)),
@@ -92,7 +92,7 @@ def _ends(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
             yield Violation(vehicle.name, limit, "", off_m, 0.0)
 
 
-def _near_things(mission: Mission, vehicle: VehiclePlan, in_zone: BoolArray) -> Iterator[Violation]:
+def _near_things(mission: Mission, vehicle: TimedCurve, in_zone: BoolArray) -> Iterator[Violation]:
     limits, solid = mission.limits, obstacles.pack(mission.world.as_known())
     clearance_m = obstacles.clearance(vehicle.curve_m, solid)
     yield from _least(
@@ -102,33 +102,33 @@ def _near_things(mission: Mission, vehicle: VehiclePlan, in_zone: BoolArray) -> 
     yield from _least(vehicle, Limit.HEIGHT, height_m, np.where(in_zone, 0.0, limits.height_m))
 
 
-def _outside(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
+def _outside(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
     low_m, high_m = flight_box(mission)
     out_m = np.maximum(low_m - vehicle.curve_m, vehicle.curve_m - high_m).max(axis=1)
     yield from _most(vehicle, Limit.BOUNDS, out_m, 0.0)
 
 
-def _shape(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
+def _shape(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
     limits, steps_m = mission.limits, np.diff(vehicle.curve_m, axis=0)
     radius_m = 1.0 / np.maximum(curvature(vehicle.curve_m), 1e-12)
     yield from _least(vehicle, Limit.TURN_RADIUS, radius_m, np.full(len(radius_m), limits.turn_radius_m))
-    climb_deg = np.degrees(np.arctan2(np.abs(steps_m[:, 2]), np.linalg.norm(steps_m[:, :2], axis=1)))
+    climb_deg = np.degrees(np.arctan2(np.abs(steps_m[:, 2]), np.hypot(steps_m[:, 0], steps_m[:, 1])))
     yield from _most(vehicle, Limit.CLIMB_ANGLE, climb_deg, limits.climb_angle_deg)
 
 
-def _reach(mission: Mission, vehicle: VehiclePlan) -> Iterator[Violation]:
-    length_m = float(np.linalg.norm(np.diff(vehicle.curve_m, axis=0), axis=1).sum())
+def _reach(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
+    length_m = float(path_lengths(vehicle.curve_m))
     if length_m > mission.limits.range_m:
         yield Violation(vehicle.name, Limit.RANGE, "", length_m, mission.limits.range_m)
     if vehicle.times_s[-1] > mission.limits.endurance_s:
         yield Violation(vehicle.name, Limit.ENDURANCE, "", float(vehicle.times_s[-1]), mission.limits.endurance_s)
 
 
-def _mean_separations(mission: Mission, vehicles: Sequence[VehiclePlan], fleet: _Fleet) -> Iterator[Violation]:
+def _mean_separations(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) -> Iterator[Violation]:
     """The mean over the flight, at equal fractions of the paths, of each vehicle's mean distance to the others."""
     low_m, high_m = mission.limits.mean_separation_m
     for vehicle, own_m in zip(vehicles, fleet.places_m, strict=True):
-        apart_m = np.linalg.norm(fleet.places_m - own_m, axis=-1).sum(axis=0) / (len(vehicles) - 1)
+        apart_m = lengths(fleet.places_m - own_m).sum(axis=0) / (len(vehicles) - 1)
         mean_m = float(np.trapezoid(apart_m) / (len(apart_m) - 1))
         if mean_m < low_m:
             yield Violation(vehicle.name, Limit.LEAST_MEAN_SEPARATION, "", mean_m, low_m)
@@ -136,7 +136,7 @@ def _mean_separations(mission: Mission, vehicles: Sequence[VehiclePlan], fleet: 
             yield Violation(vehicle.name, Limit.GREATEST_MEAN_SEPARATION, "", mean_m, high_m)
 
 
-def _separations(mission: Mission, vehicles: Sequence[VehiclePlan], fleet: _Fleet) -> Iterator[Violation]:
+def _separations(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) -> Iterator[Violation]:
     """The separation of every two vehicles at all pairs of times that lie no more than the time slack apart."""
     n = len(vehicles)
     for i in range(n):
@@ -161,31 +161,32 @@ def _closest(mission: Mission, fleet: _Fleet, i: int) -> tuple[Array, npt.NDArra
         Three (vehicles,): how much separation is missing [m], sample of vehicle i, samples that the other is ahead.
     """
     limits, times_s, m = mission.limits, fleet.times_s, len(fleet.times_s)
-    worst_m, at, shift = np.full(len(fleet.places_m), -np.inf), *np.zeros((2, len(fleet.places_m)), dtype=np.int64)
+    n = len(fleet.places_m)
+    worst_m, at, shift = np.full(n, -np.inf), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     slack_s = mission.planner.time_slack_s + ROUNDING
     most = int((np.searchsorted(times_s, times_s + slack_s, "right") - np.arange(m)).max())
     for ahead in range(min(most, m)):
         now, then = slice(0, m - ahead), slice(ahead, m)
-        apart_m = np.linalg.norm(fleet.places_m[:, then] - fleet.places_m[i, now], axis=-1)
         joined = fleet.joined[i, now] & fleet.joined[:, then]
         resting = fleet.near_start[i, now] & fleet.near_start[:, then]
         required_m = np.where(resting, np.where(joined, 2.0 * limits.body_radius_m, 0.0), limits.separation_m)
-        short_m = np.where(times_s[then] - times_s[now] <= slack_s, required_m - apart_m, -np.inf)
+        short_m = required_m - lengths(fleet.places_m[:, then] - fleet.places_m[i, now])
+        short_m[:, times_s[then] - times_s[now] > slack_s] = -np.inf
         where = np.argmax(short_m, axis=1)
-        found_m = np.take_along_axis(short_m, where[:, None], axis=1)[:, 0]
+        found_m = short_m[np.arange(n), where]
         better = found_m > worst_m
         worst_m[better], at[better], shift[better] = found_m[better], where[better], ahead
     return worst_m, at, shift
 
 
-def _least(vehicle: VehiclePlan, limit: Limit, found: Array, required: Array) -> Iterator[Violation]:
+def _least(vehicle: TimedCurve, limit: Limit, found: Array, required: Array) -> Iterator[Violation]:
     worst = int(np.argmax(required - found))
     if required[worst] - found[worst] > ROUNDING:
         where = _at(vehicle.curve_m[worst], float(vehicle.times_s[worst]))
         yield Violation(vehicle.name, limit, where, float(found[worst]), float(required[worst]))
 
 
-def _most(vehicle: VehiclePlan, limit: Limit, found: Array, required: float) -> Iterator[Violation]:
+def _most(vehicle: TimedCurve, limit: Limit, found: Array, required: float) -> Iterator[Violation]:
     worst = int(np.argmax(found))
     if found[worst] - required > ROUNDING:
         where = _at(vehicle.curve_m[worst], float(vehicle.times_s[worst]))

@@ -4,11 +4,10 @@ f = sum over vehicles of  phi_1 L - phi_2 mean(lambda) - phi_3 mean(h),  means o
 where the mission caps them. The search computes the same sum from fewer samples (`curve_cost`).
 """
 
-from collections.abc import Iterable
-
 import numpy as np
 import numpy.typing as npt
 
+from gcs.planner.curves import lengths
 from gcs.planner.limits import clearance_cap_m, height_cap_m
 from missions import obstacles
 from missions.mission import Mission
@@ -16,19 +15,13 @@ from missions.mission import Mission
 Array = npt.NDArray[np.float64]
 
 
-def objective(mission: Mission, curves_m: Iterable[Array]) -> float:
-    """f of eq. 13 of (m, 3) curves, ENU [m], in the mission's world as it is known."""
-    world = mission.world.as_known()
-    solid = obstacles.pack(world)
-    weights, total = mission.planner, 0.0
-    for curve_m in curves_m:
-        clearance_m = np.minimum(obstacles.clearance(curve_m, solid), clearance_cap_m(mission, world))
-        height_m = np.minimum(curve_m[:, 2] - obstacles.terrain_height(curve_m, solid), height_cap_m(mission))
-        sides_m = np.linalg.norm(np.diff(curve_m, axis=0), axis=1)
-        reward = weights.clearance_weight * clearance_m + weights.height_weight * height_m
-        length_m = sides_m.sum()
-        mean_reward = (
-            float(0.5 * (reward[1:] + reward[:-1]) @ sides_m / length_m) if length_m > 0.0 else float(reward[0])
-        )
-        total += weights.length_weight * float(length_m) - mean_reward
-    return total
+def objective(mission: Mission, curves_m: Array, clearance_m: Array) -> float:
+    """f of eq. 13 of (vehicles, m, 3) curves, ENU [m], with (vehicles, m) clearances in the world as it is known."""
+    weights, world = mission.planner, mission.world.as_known()
+    height_m = curves_m[..., 2] - obstacles.terrain_height(curves_m, obstacles.pack(world))
+    reward = weights.clearance_weight * np.minimum(clearance_m, clearance_cap_m(mission, world))
+    reward += weights.height_weight * np.minimum(height_m, height_cap_m(mission))
+    sides_m = lengths(np.diff(curves_m, axis=1))
+    length_m = np.maximum(sides_m.sum(axis=1), 1e-9)
+    mean_reward = np.sum(0.5 * (reward[:, 1:] + reward[:, :-1]) * sides_m, axis=1) / length_m
+    return float(np.sum(weights.length_weight * length_m - mean_reward))

@@ -1,6 +1,7 @@
-"""Clearance and height above the terrain with their gradients, for the compiled cost of a curve.
+"""Clearance and height above the terrain with their gradients, for the samples of a curve.
 
-The same distances as `missions.obstacles.clearance`, which has no gradients; a test holds the two equal.
+The same distances as `missions.obstacles.clearance`, which has no gradients; a test holds the two equal. Every function
+goes through all samples, so that its arrays are unpacked once per curve.
 """
 
 import numpy as np
@@ -11,8 +12,6 @@ from missions.obstacles import FAR_M, Obstacles
 from missions.world import BASE_HEIGHT_SHARE
 
 Array = npt.NDArray[np.float64]
-Gradient = tuple[float, float, float, float]
-"""A value [m] and its derivatives by east, north and up."""
 
 PROFILE_STEPS = 32
 PROFILE_EDGE = float(np.sqrt(-np.log(BASE_HEIGHT_SHARE)))
@@ -21,95 +20,112 @@ PROFILE = np.exp(-(np.linspace(0.0, PROFILE_EDGE, PROFILE_STEPS + 1) ** 2))
 """The profile of eq. 23 in units of height and slope: one table serves every peak."""
 
 NEWTON_STEPS = 20
+NO_GROUND = 40.0
+"""Exponent from which on a peak of eq. 23 is lower than a double can tell."""
 
 
 @compiled
-def clearance_gradient_at(east: float, north: float, up: float, obstacles: Obstacles, cap_m: float) -> Gradient:
-    """min(clearance, cap_m) of one point and its gradient; the gradient is zero where the cap holds."""
-    nearest = (min(cap_m, FAR_M), 0.0, 0.0, 0.0)
-    threats = obstacles.threats
-    for i in range(len(threats)):
-        de, dn = east - threats[i, 0], north - threats[i, 1]
-        distance = max(np.sqrt(de * de + dn * dn + up * up), 1e-9)
-        if distance - threats[i, 2] < nearest[0]:  # eq. 22
-            nearest = (distance - threats[i, 2], de / distance, dn / distance, up / distance)
-    for i in range(len(obstacles.boxes)):
-        nearest = _nearer_box(east, north, up, obstacles.boxes, i, nearest)
-    for i in range(len(obstacles.cylinders)):
-        nearest = _nearer_cylinder(east, north, up, obstacles.cylinders, i, nearest)
-    for i in range(len(obstacles.peaks)):
-        nearest = _nearer_peak(east, north, up, obstacles.peaks, i, nearest)
-    return nearest
+def clearances(points_m: Array, obstacles: Obstacles, cap_m: float, out: Array) -> None:
+    """Fill (m, 4) `out` with min(clearance, cap_m) of (m, 3) points and its gradient, zero where the cap holds."""
+    out[:, 0] = min(cap_m, FAR_M)
+    out[:, 1:] = 0.0
+    _threats(points_m, obstacles.threats, out)
+    _boxes(points_m, obstacles.boxes, out)
+    _cylinders(points_m, obstacles.cylinders, out)
+    _peaks(points_m, obstacles.peaks, out)
 
 
 @compiled
-def height_gradient_at(east: float, north: float, up: float, obstacles: Obstacles) -> Gradient:
-    """Height above the terrain of eq. 23 and its gradient."""
-    height, ge, gn = up, 0.0, 0.0
+def heights(points_m: Array, obstacles: Obstacles, out: Array) -> None:
+    """Fill (m, 4) `out` with the heights of (m, 3) points above the terrain of eq. 23, and their gradients."""
     peaks = obstacles.peaks
+    for m in range(len(points_m)):
+        out[m, 0], out[m, 1], out[m, 2], out[m, 3] = points_m[m, 2], 0.0, 0.0, 1.0
+        for i in range(len(peaks)):
+            de, dn = points_m[m, 0] - peaks[i, 0], points_m[m, 1] - peaks[i, 1]
+            steepness = 1.0 / (peaks[i, 2] * peaks[i, 2])
+            exponent = (de * de + dn * dn) * steepness
+            if exponent < NO_GROUND:
+                ground = peaks[i, 3] * np.exp(-exponent)
+                out[m, 0] -= ground
+                out[m, 1] += 2.0 * de * steepness * ground
+                out[m, 2] += 2.0 * dn * steepness * ground
+
+
+@compiled
+def _threats(points_m: Array, threats: Array, out: Array) -> None:
+    for i in range(len(threats)):
+        for m in range(len(points_m)):
+            de, dn, du = points_m[m, 0] - threats[i, 0], points_m[m, 1] - threats[i, 1], points_m[m, 2]
+            from_centre = np.sqrt(de * de + dn * dn + du * du)
+            if from_centre - threats[i, 2] < out[m, 0]:  # eq. 22
+                scale = 1.0 / max(from_centre, 1e-9)
+                out[m, 0] = from_centre - threats[i, 2]
+                out[m, 1], out[m, 2], out[m, 3] = de * scale, dn * scale, du * scale
+
+
+@compiled
+def _boxes(points_m: Array, boxes: Array, out: Array) -> None:
+    for i in range(len(boxes)):
+        for m in range(len(points_m)):
+            oe, on, ou = points_m[m, 0] - boxes[i, 0], points_m[m, 1] - boxes[i, 1], points_m[m, 2] - boxes[i, 2]
+            de, dn, du = abs(oe) - boxes[i, 3], abs(on) - boxes[i, 4], abs(ou) - boxes[i, 5]
+            ce, cn, cu = max(de, 0.0), max(dn, 0.0), max(du, 0.0)
+            outside = np.sqrt(ce * ce + cn * cn + cu * cu)
+            inside = min(max(de, max(dn, du)), 0.0)
+            if outside + inside >= out[m, 0]:
+                continue
+            if outside > 0.0:
+                ce, cn, cu = ce / outside, cn / outside, cu / outside
+            else:  # out through the nearest face
+                ce, cn, cu = 1.0 * (de == inside), 1.0 * (dn == inside), 1.0 * (du == inside)
+            out[m, 0] = outside + inside
+            out[m, 1], out[m, 2], out[m, 3] = np.sign(oe) * ce, np.sign(on) * cn, np.sign(ou) * cu
+
+
+@compiled
+def _cylinders(points_m: Array, cylinders: Array, out: Array) -> None:
+    for i in range(len(cylinders)):
+        for m in range(len(points_m)):
+            de, dn, up = points_m[m, 0] - cylinders[i, 0], points_m[m, 1] - cylinders[i, 1], points_m[m, 2]
+            from_axis = np.sqrt(de * de + dn * dn)
+            radial, below, above = from_axis - cylinders[i, 2], cylinders[i, 3] - up, up - cylinders[i, 4]
+            axial = max(below, above)
+            cr, ca = max(radial, 0.0), max(axial, 0.0)
+            outside = np.sqrt(cr * cr + ca * ca)
+            inside = min(max(radial, axial), 0.0)
+            if outside + inside >= out[m, 0]:
+                continue
+            if outside > 0.0:
+                cr, ca = cr / outside, ca / outside
+            else:
+                cr, ca = 1.0 * (radial == inside), 1.0 * (axial == inside)
+            scale = cr / max(from_axis, 1e-9)
+            out[m, 0] = outside + inside
+            out[m, 1], out[m, 2], out[m, 3] = de * scale, dn * scale, ca if above > below else -ca
+
+
+@compiled
+def _peaks(points_m: Array, peaks: Array, out: Array) -> None:
+    """Distances to Gaussian hills of revolution: to the nearest points of their profiles z(u) = H exp(-u^2 / s^2)."""
     for i in range(len(peaks)):
-        de, dn = east - peaks[i, 0], north - peaks[i, 1]
-        steepness = 1.0 / (peaks[i, 2] * peaks[i, 2])
-        exponent = (de * de + dn * dn) * steepness
-        if exponent < 40.0:  # below a double's resolution of any height beyond
-            ground = peaks[i, 3] * np.exp(-exponent)
-            height -= ground
-            ge += 2.0 * de * steepness * ground
-            gn += 2.0 * dn * steepness * ground
-    return height, ge, gn, 1.0
-
-
-@compiled
-def _nearer_box(east: float, north: float, up: float, boxes: Array, i: int, nearest: Gradient) -> Gradient:
-    oe, on, ou = east - boxes[i, 0], north - boxes[i, 1], up - boxes[i, 2]
-    de, dn, du = abs(oe) - boxes[i, 3], abs(on) - boxes[i, 4], abs(ou) - boxes[i, 5]
-    ce, cn, cu = max(de, 0.0), max(dn, 0.0), max(du, 0.0)
-    outside = np.sqrt(ce * ce + cn * cn + cu * cu)
-    distance = outside + min(max(de, max(dn, du)), 0.0)
-    if distance >= nearest[0]:
-        return nearest
-    if outside > 0.0:
-        return distance, np.sign(oe) * ce / outside, np.sign(on) * cn / outside, np.sign(ou) * cu / outside
-    if de >= dn and de >= du:  # inside: out through the nearest face
-        return distance, np.sign(oe), 0.0, 0.0
-    if dn >= du:
-        return distance, 0.0, np.sign(on), 0.0
-    return distance, 0.0, 0.0, np.sign(ou)
-
-
-@compiled
-def _nearer_cylinder(east: float, north: float, up: float, cylinders: Array, i: int, nearest: Gradient) -> Gradient:
-    de, dn = east - cylinders[i, 0], north - cylinders[i, 1]
-    from_axis = max(np.sqrt(de * de + dn * dn), 1e-9)
-    radial, below, above = from_axis - cylinders[i, 2], cylinders[i, 3] - up, up - cylinders[i, 4]
-    axial = max(below, above)
-    cr, ca = max(radial, 0.0), max(axial, 0.0)
-    outside = np.sqrt(cr * cr + ca * ca)
-    distance = outside + min(max(radial, axial), 0.0)
-    if distance >= nearest[0]:
-        return nearest
-    gr, ga = (cr / outside, ca / outside) if outside > 0.0 else ((1.0, 0.0) if radial >= axial else (0.0, 1.0))
-    return distance, gr * de / from_axis, gr * dn / from_axis, ga if above > below else -ga
-
-
-@compiled
-def _nearer_peak(east: float, north: float, up: float, peaks: Array, i: int, nearest: Gradient) -> Gradient:
-    """Distance to a Gaussian hill of revolution: to the nearest point of its profile z(u) = H exp(-u^2 / s^2)."""
-    de, dn = east - peaks[i, 0], north - peaks[i, 1]
-    radius = max(np.sqrt(de * de + dn * dn), 1e-9)
-    slope, height, edge = peaks[i, 2], peaks[i, 3], peaks[i, 4]
-    if max(radius - edge, up - height) >= nearest[0]:
-        return nearest  # its bounding cylinder is farther off already
-    foot = slope * _foot_on_profile(radius / slope, up / slope, height / slope)
-    ground = height * np.exp(-(foot * foot) / (slope * slope))
-    across, along = radius - foot, up - ground
-    distance = max(np.sqrt(across * across + along * along), 1e-9)
-    if radius < edge and up < height * np.exp(-(radius * radius) / (slope * slope)):
-        distance = -distance
-    if distance >= nearest[0]:
-        return nearest
-    outwards = across / distance / radius
-    return distance, outwards * de, outwards * dn, along / distance
+        slope, height, edge = peaks[i, 2], peaks[i, 3], peaks[i, 4]
+        for m in range(len(points_m)):
+            de, dn, up = points_m[m, 0] - peaks[i, 0], points_m[m, 1] - peaks[i, 1], points_m[m, 2]
+            radius = np.sqrt(de * de + dn * dn)
+            across, along = max(radius - edge, 0.0), max(up - height, 0.0)
+            if across * across + along * along >= out[m, 0] * out[m, 0] and out[m, 0] > 0.0:
+                continue  # its bounding cylinder is farther off already
+            foot = slope * _foot_on_profile(radius / slope, up / slope, height / slope)
+            ground = height * np.exp(-(foot * foot) / (slope * slope))
+            across, along = radius - foot, up - ground
+            distance = max(np.sqrt(across * across + along * along), 1e-9)
+            if radius < edge and up < height * np.exp(-(radius * radius) / (slope * slope)):
+                distance = -distance
+            if distance < out[m, 0]:
+                scale = across / distance / max(radius, 1e-9)
+                out[m, 0] = distance
+                out[m, 1], out[m, 2], out[m, 3] = scale * de, scale * dn, along / distance
 
 
 @compiled

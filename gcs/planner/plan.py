@@ -92,8 +92,8 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class VehiclePlan:
-    """One vehicle's part of a plan.
+class TimedCurve:
+    """Where one vehicle goes, and when: what the judge looks at.
 
     Args:
         name: of the vehicle.
@@ -102,8 +102,6 @@ class VehiclePlan:
         curve_m: (m, 3) ENU samples from the launch point to the target, equally spaced along the curve; sample i of
             all vehicles is passed at the same time.
         times_s: (m,) seconds since the common start T0 at which they are passed.
-        track: the points and speeds that autopilot and companion are given.
-        length_m: of the curve.
     """
 
     name: str
@@ -111,6 +109,17 @@ class VehiclePlan:
     target: Target
     curve_m: Array
     times_s: Array
+
+
+@dataclass(frozen=True)
+class VehiclePlan(TimedCurve):
+    """One vehicle's part of a plan.
+
+    Args:
+        track: the points and speeds that autopilot and companion are given.
+        length_m: of the curve.
+    """
+
     track: Track
     length_m: float
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from gcs.errors import UsageError
 from gcs.planner.allocation import allocate
+from gcs.planner.assembly import vehicle_plans
 from gcs.planner.budget import new_budget
 from gcs.planner.plan import FleetPlan, Progress
 from gcs.planner.search import FleetSearch
@@ -60,7 +61,7 @@ def plan_mission(
         feasible=not found.violations,
         violations=found.violations,
         convergence=tuple(search.convergence),
-        vehicles=found.vehicles,
+        vehicles=vehicle_plans(mission, found),
     )
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.planner import limits
+from gcs.planner.coupling import Coupling
 from gcs.planner.curve_cost import Terms, sampling
-from gcs.planner.fleet_cost import Coupling, Problem
-from gcs.planner.representation import Guide, straight_guide
+from gcs.planner.fleet_cost import Problem
+from gcs.planner.representation import Guide, guide_along, straight_guide
 from missions import obstacles, time_law
 from missions.mission import Mission, Target
 
@@ -20,6 +21,9 @@ PENALTY = 0.3
 """A violation of one costs as much as this share of the fleet's mean straight flight."""
 MEAN_UNIT_SHARE = 0.1
 """A mean separation that is off by this share of its upper bound, or of the mission's size, is a violation of one."""
+
+POINTS_PER_CORNER = 3
+MOST_CONTROL_POINTS = 24
 
 FRACTIONS = 48
 """Fractions of the paths at which vehicles are compared."""
@@ -66,10 +70,20 @@ class Care:
         return Care(2 * self.samples, 2.0 * self.distance_share, 2.0 * self.share, 2.0 * self.turn_share)
 
 
-def straight_guides(mission: Mission, routes: list[Route]) -> list[Guide]:
-    """The straight line of every route."""
-    n_control, bounds = mission.planner.control_points, mission.world.bounds
-    return [straight_guide(route.start_m, route.target_m, n_control, bounds) for route in routes]
+def guides(
+    mission: Mission, routes: list[Route], paths_m: list[Array | None] | None = None, n_control: int | None = None
+) -> list[Guide]:
+    """What offsets are counted from: the straight line of every route, or the (m, 3) path that it is given."""
+    n, bounds = n_control or mission.planner.control_points, mission.world.bounds
+    return [
+        straight_guide(route.start_m, route.target_m, n, bounds) if path is None else guide_along(path, n, bounds)
+        for route, path in zip(routes, paths_m or [None] * len(routes), strict=True)
+    ]
+
+
+def control_points(mission: Mission, corners: int) -> int:
+    """Control points of curves along a path with so many corners: as the mission says, or enough to follow it."""
+    return max(mission.planner.control_points, min(POINTS_PER_CORNER * corners, MOST_CONTROL_POINTS))
 
 
 def pose(mission: Mission, routes: list[Route], guides: list[Guide], care: Care = Care()) -> Problem:
@@ -112,17 +126,19 @@ def _terms(mission: Mission, routes: list[Route], care: Care) -> Terms:
         climb_sine=float(np.sin(np.radians(kept.climb_angle_deg))) * (1.0 - care.share),
         length_m=limits.path_limit_m(mission) * (1.0 - care.share),
         unit_m=unit_m,
-        low_m=low_m,
-        high_m=high_m,
+        low_m=(float(low_m[0]), float(low_m[1]), float(low_m[2])),
+        high_m=(float(high_m[0]), float(high_m[1]), float(high_m[2])),
     )
 
 
 def _coupling(mission: Mission, routes: list[Route], care: Care) -> Coupling:
     kept = mission.limits
     mean_low_m, mean_high_m = kept.mean_separation_m
-    first, last = _windows(mission, max(route.direct_m for route in routes))
+    longest_m = max(route.direct_m for route in routes)
+    first, last = _windows(mission, longest_m)
+    missed_m = 0.5 * longest_m / (FRACTIONS - 1) if mission.planner.time_slack_s > 0.0 else 0.0
     return Coupling(
-        separation_m=kept.separation_m * (1.0 + care.distance_share),
+        separation_m=float(np.hypot(kept.separation_m, missed_m)) * (1.0 + care.distance_share),
         zone_radius_m=mission.launch_zone_radius_m,
         contact_m=2.0 * kept.body_radius_m * (1.0 + care.distance_share),
         join_m=limits.join_distance_m(mission),

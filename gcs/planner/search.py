@@ -10,13 +10,14 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from gcs.planner.assembly import Candidate, assemble
+from gcs.planner.assembly import Candidate, judged
 from gcs.planner.budget import Budget
 from gcs.planner.cooperation import Cooperation
 from gcs.planner.ecpso import EcpsoSettings
 from gcs.planner.fleet_cost import all_control_points
+from gcs.planner.guide_path import guide_path
 from gcs.planner.plan import Progress
-from gcs.planner.problem import Care, Route, pose, straight_guides
+from gcs.planner.problem import Care, Route, control_points, guides, pose
 from gcs.planner.refinement import Refined, Stage, refine
 from missions.mission import Mission
 
@@ -26,8 +27,14 @@ QUICK = (Stage(1.0, 40), Stage(10.0, 20), Stage(100.0, 20))
 """Polish of the first particles: a feasible plan soon."""
 THOROUGH = (Stage(1.0, 60), Stage(10.0, 40), Stage(100.0, 20))
 """Polish of what a round of the swarms has found."""
-LOOKS_FEASIBLE = 1e-5
-"""A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge."""
+LOOKS_FEASIBLE = 1e-4
+"""A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge ..."""
+SHOULD_BE_FEASIBLE = 1e-6
+"""... and one with less than this that the judge refuses was not looked at closely enough."""
+WORTH_JUDGING = 1e-3
+"""Relative gain over the best plan so far that makes the judge look before the end."""
+PATIENCE = 2
+"""Rounds after which vehicles without a flyable curve get a guide path."""
 MERIT_STRICTNESS = 100.0
 """Two polished plans are compared with violations weighing so many times more than in the search."""
 MOST_RAISES = 3
@@ -50,7 +57,7 @@ class FleetSearch:
     ) -> None:
         self._mission, self._routes, self._budget, self._on_progress = mission, routes, budget, on_progress
         self._care, self._raises = Care(), 0
-        self._guides = straight_guides(mission, routes)
+        self._guides = guides(mission, routes)
         self._settings = EcpsoSettings()
         self._problem = pose(mission, routes, self._guides, self._care)
         self._swarms = Cooperation(self._problem, self._settings, np.random.default_rng(seed))
@@ -73,11 +80,14 @@ class FleetSearch:
             self._swarms.round()
             self._iterations += self._settings.window
             self._polish(THOROUGH)
+            if self._best is None and self._iterations == PATIENCE * self._settings.window:
+                self._find_ways_around()
             self._report()
-        if self._best is not None:
-            return self._best
         assert self._present is not None
-        return self._assembled(self._present.offsets)
+        last = self._judged(self._present.offsets)
+        if self._best is None or (not last.violations and last.objective < self._best.objective):
+            return last
+        return self._best
 
     def _polish(self, stages: tuple[Stage, ...]) -> None:
         """Polish the swarms' plan; take it over if it is better than the present one, and let the judge see it."""
@@ -86,18 +96,37 @@ class FleetSearch:
         if self._present is None or self._merit(refined) < self._merit(self._present):
             self._present = refined
         self._swarms.adopt(self._present.offsets)
-        if self._present is refined and refined.violation < LOOKS_FEASIBLE:
+        enough = np.inf if self._best is None else self._best.objective - WORTH_JUDGING * abs(self._best.objective)
+        if self._present is refined and refined.violation < LOOKS_FEASIBLE and refined.objective < enough:
             self._show_judge(refined)
 
     def _show_judge(self, refined: Refined) -> None:
-        candidate = self._assembled(refined.offsets)
-        if candidate.violations:
+        candidate = self._judged(refined.offsets)
+        if not candidate.violations:
+            if self._best is None or candidate.objective < self._best.objective:
+                self._best = candidate
+        elif refined.violation < SHOULD_BE_FEASIBLE:
             self._look_closer()
-        elif self._best is None or candidate.objective < self._best.objective:
-            self._best = candidate
+
+    def _find_ways_around(self) -> None:
+        """Give vehicles that cannot even fly alone a guide path around what is in their way, and start afresh."""
+        stuck = self._swarms.violations_alone(self._swarms.offsets) > LOOKS_FEASIBLE
+        paths = [self._way_around(route) if alone else None for route, alone in zip(self._routes, stuck, strict=True)]
+        corners = max((len(path) for path in paths if path is not None), default=0)
+        if corners == 0:
+            return
+        self._guides = guides(self._mission, self._routes, paths, control_points(self._mission, corners))
+        self._problem = pose(self._mission, self._routes, self._guides, self._care)
+        self._swarms = self._swarms.again(self._problem)
+        self._present = None
+        self._swarms.start()
+        self._polish(THOROUGH)
+
+    def _way_around(self, route: Route) -> Array | None:
+        return guide_path(self._mission, route.start_m, route.target_m)
 
     def _look_closer(self) -> None:
-        """After a breach that the search did not see."""
+        """Mend a breach that the search did not see, and see such ones from now on."""
         if self._raises == MOST_RAISES:
             return
         self._raises += 1
@@ -105,12 +134,13 @@ class FleetSearch:
         self._problem = pose(self._mission, self._routes, self._guides, self._care)
         self._swarms.pose(self._problem)
         self._present = None
+        self._polish(THOROUGH)
 
     def _merit(self, refined: Refined) -> float:
         return refined.objective + MERIT_STRICTNESS * self._problem.terms.penalty_weight * refined.violation
 
-    def _assembled(self, offsets: Array) -> Candidate:
-        return assemble(self._mission, self._routes, all_control_points(self._problem, offsets))
+    def _judged(self, offsets: Array) -> Candidate:
+        return judged(self._mission, self._routes, all_control_points(self._problem, offsets))
 
     def _report(self) -> None:
         assert self._present is not None

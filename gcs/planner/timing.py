@@ -10,11 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from missions import obstacles, time_law
+from gcs.planner.curves import curvature, path_lengths
+from missions import time_law
 from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+
+UP_TO_SPEED = 0.95
+"""Where the fleet does not get to this share of cruise speed between two obstacles, it does not speed up at all."""
 
 
 @dataclass(frozen=True)
@@ -32,37 +36,39 @@ class Timing:
     held_back: BoolArray
 
 
-def common_timing(mission: Mission, curves_m: list[Array]) -> Timing:
-    """The fastest common progress along (m, 3) curves under the mission's limits of speed and acceleration.
+def common_timing(mission: Mission, curves_m: Array, clearance_m: Array) -> Timing:
+    """The fastest common progress along the curves under the mission's limits of speed and acceleration.
 
     Both speeds and the sideways acceleration in turns are kept by every vehicle; the acceleration along the path by
     the one with the longest path, and so by all.
+
+    Args:
+        mission: for its limits.
+        curves_m: (vehicles, m, 3) samples, ENU [m].
+        clearance_m: (vehicles, m) at them.
     """
-    kept, solid = mission.limits, obstacles.pack(mission.world.as_known())
-    lengths_m = np.array([max(float(time_law.arc_length(curve_m)[-1]), 1e-6) for curve_m in curves_m])
-    near = np.array([obstacles.clearance(curve_m, solid) < kept.avoidance_distance_m for curve_m in curves_m])
+    kept = mission.limits
+    lengths_m = np.maximum(path_lengths(curves_m), 1e-6)
+    near = clearance_m < kept.avoidance_distance_m
     speeds_m_s = np.where(near, kept.avoidance_speed_m_s, kept.cruise_speed_m_s)
-    turning_m_s = np.array([np.sqrt(kept.acceleration_m_s2 / np.maximum(curvature(curve), 1e-9)) for curve in curves_m])
+    turning_m_s = np.sqrt(kept.acceleration_m_s2 / np.maximum([curvature(curve_m) for curve_m in curves_m], 1e-9))
     allowed_1_s = np.min(speeds_m_s / lengths_m[:, None], axis=0)
     limit_1_s = np.minimum(allowed_1_s, np.min(turning_m_s / lengths_m[:, None], axis=0))
     longest = np.zeros((len(allowed_1_s), 3))
     longest[:, 0] = np.linspace(0.0, lengths_m.max(), len(allowed_1_s))
     law_m_s = time_law.speeds_along(longest, limit_1_s * lengths_m.max(), kept.acceleration_m_s2)
-    return Timing(time_law.times_along(longest, law_m_s), allowed_1_s, _held_back(np.any(near, axis=0), law_m_s))
+    held_back = _held_back(np.any(near, axis=0), law_m_s, kept.cruise_speed_m_s)
+    return Timing(time_law.times_along(longest, law_m_s), allowed_1_s, held_back)
 
 
-def curvature(curve_m: Array) -> Array:
-    """(m,) curvature [1/m] of a densely sampled (m, 3) curve: of the circle through each sample and its neighbours."""
-    before, after = np.diff(curve_m, axis=0)[:-1], np.diff(curve_m, axis=0)[1:]
-    sides = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1) * np.linalg.norm(before + after, axis=1)
-    inner = 2.0 * np.linalg.norm(np.cross(before, after), axis=1) / np.maximum(sides, 1e-12)
-    return np.concatenate((inner[:1], inner, inner[-1:]))
-
-
-def _held_back(slow: BoolArray, law_m_s: Array) -> BoolArray:
-    """`slow`, drawn out backwards over the braking before it."""
+def _held_back(slow: BoolArray, law_m_s: Array, cruise_m_s: float) -> BoolArray:
+    """`slow`, drawn out backwards over the braking before it, and over gaps too short to get up to speed in."""
+    if not slow.any():
+        return slow
     held = slow.copy()
     braking = np.append(np.diff(law_m_s) < 0.0, False)
     for i in range(len(held) - 2, -1, -1):
         held[i] |= held[i + 1] and braking[i]
+    for run in np.split(np.arange(len(held)), np.flatnonzero(np.diff(held)) + 1)[1:-1]:
+        held[run] |= law_m_s[run].max() < UP_TO_SPEED * cruise_m_s
     return held

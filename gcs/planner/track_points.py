@@ -5,15 +5,19 @@ import itertools
 import numpy as np
 import numpy.typing as npt
 
+from gcs.planner.curves import distances_to_segment, path_lengths
 from gcs.planner.timing import Timing
 from missions.mission import Mission, Site
 from missions.mission_items import Track
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 MOST_POINTS = 20
 TOLERANCE_SHARE = 1.0 / 6.0
 """Legs stay within this share of the limit of clearance of the curve: 0.1 m of 0.6 m."""
+LOOKED_AT = 400
+"""Samples of a curve among which track points are chosen."""
 LEAST_TOLERANCE_M = 0.05
 COARSER = 1.3
 SPEED_STEP_M_S = {Site.INDOOR: 0.1, Site.OUTDOOR: 0.01}
@@ -28,17 +32,18 @@ def sample_track(mission: Mission, curve_m: Array, timing: Timing) -> Track:
     there are no more than `MOST_POINTS`.
     """
     fixed = [0, *(np.flatnonzero(np.diff(timing.held_back)) + 1).tolist(), len(curve_m) - 1]
+    looked_at = np.union1d(fixed, np.linspace(0, len(curve_m) - 1, min(LOOKED_AT, len(curve_m))).astype(int))
     tolerance_m = max(TOLERANCE_SHARE * mission.limits.clearance_m, LEAST_TOLERANCE_M)
-    kept = _thinned(curve_m, fixed, tolerance_m)
+    kept = looked_at[_thinned(curve_m[looked_at], np.searchsorted(looked_at, fixed), tolerance_m)]
     while len(kept) > max(MOST_POINTS + 1, len(fixed)):
         tolerance_m *= COARSER
-        kept = _thinned(curve_m, fixed, tolerance_m)
+        kept = looked_at[_thinned(curve_m[looked_at], np.searchsorted(looked_at, fixed), tolerance_m)]
     return Track(curve_m[kept[1:]], _leg_speeds(mission, curve_m, timing, kept))
 
 
-def _thinned(curve_m: Array, fixed: list[int], tolerance_m: float) -> list[int]:
+def _thinned(curve_m: Array, fixed: IntArray, tolerance_m: float) -> list[int]:
     """Indices of samples between which straight legs stay within `tolerance_m` (Douglas and Peucker)."""
-    kept, stack = {fixed[0]}, list(itertools.pairwise(fixed))
+    kept, stack = {0}, list(itertools.pairwise(fixed.tolist()))
     while stack:
         begin, end = stack.pop()
         off_m = distances_to_segment(curve_m[begin : end + 1], curve_m[begin], curve_m[end])
@@ -50,17 +55,10 @@ def _thinned(curve_m: Array, fixed: list[int], tolerance_m: float) -> list[int]:
     return sorted(kept)
 
 
-def distances_to_segment(points_m: Array, begin_m: Array, end_m: Array) -> Array:
-    """(n,) distances of (n, 3) points to the straight segment between two (3,) points."""
-    leg = end_m - begin_m
-    along = np.clip((points_m - begin_m) @ leg / max(float(leg @ leg), 1e-12), 0.0, 1.0)
-    return np.linalg.norm(points_m - begin_m - along[:, None] * leg, axis=1)
-
-
-def _leg_speeds(mission: Mission, curve_m: Array, timing: Timing, kept: list[int]) -> Array:
+def _leg_speeds(mission: Mission, curve_m: Array, timing: Timing, kept: IntArray) -> Array:
     """(legs,) speeds that keep step with the fleet; rounded, but never up where somebody avoids something."""
     step_m_s = SPEED_STEP_M_S[mission.site]
-    length_m = float(np.linalg.norm(np.diff(curve_m, axis=0), axis=1).sum())
+    length_m = float(path_lengths(curve_m))
     steady_1_s = np.empty_like(timing.allowed_1_s)
     for run in np.split(np.arange(len(steady_1_s)), np.flatnonzero(np.diff(timing.held_back)) + 1):
         steady_1_s[run] = timing.allowed_1_s[run].min()

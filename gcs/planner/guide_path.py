@@ -1,0 +1,108 @@
+"""A way around obstacles for vehicles whose straight line is hopeless: the shortest path on a grid, pulled taut."""
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from gcs.planner.curves import lengths
+from gcs.planner.limits import flight_box
+from missions import obstacles
+from missions.mission import Mission
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+MOST_CELLS = 60_000
+CELL_SHARE = 0.5
+"""Cells are as wide as this share of the limit of clearance, if that does not make too many."""
+SPARE = 1.05
+"""The path keeps so many times the limit of clearance, since no curve follows it exactly."""
+
+STEPS = [step for step in itertools.product((-1, 0, 1), repeat=3) if step > (0, 0, 0) and any(step[:2])]
+"""Half of the steps to neighbouring cells, the other half being their opposites; none is straight up."""
+
+
+def guide_path(mission: Mission, start_m: Array, target_m: Array) -> Array | None:
+    """(m, 3) corners of a short way from start to target that keeps the limits of clearance, height and climb angle.
+
+    Returns:
+        None where there is no way, as far as the grid can tell.
+    """
+    cell_m = _cell_m(mission)
+    low_m, high_m = flight_box(mission)
+    shape = np.floor((high_m - low_m) / cell_m).astype(int) + 1
+    cells = np.stack(np.unravel_index(np.arange(np.prod(shape)), shape), axis=-1)
+    centres_m = low_m + cells * cell_m
+    free = _is_free(mission, centres_m, start_m, target_m)
+    if not free.any():
+        return None
+    begin, end = (int(np.argmin(np.where(free, lengths(centres_m - end_m), np.inf))) for end_m in (start_m, target_m))
+    away_m, before = dijkstra(_graph(cells, shape, free, cell_m), indices=begin, return_predecessors=True)
+    if not np.isfinite(away_m[end]):
+        return None
+    way = [end]
+    while way[-1] != begin:
+        way.append(int(before[way[-1]]))
+    path_m = np.concatenate((start_m[None], centres_m[way[::-1]], target_m[None]))
+    return _taut(mission, path_m, float(cell_m.min()))
+
+
+def _cell_m(mission: Mission) -> Array:
+    """(3,) size of a cell: steps to neighbours are level, or as steep as vehicles may climb."""
+    low_m, high_m = flight_box(mission)
+    steep = min(float(np.tan(np.radians(mission.limits.climb_angle_deg))), 1.0)
+    fine_m = CELL_SHARE * max(mission.limits.clearance_m, mission.limits.body_radius_m)
+    coarse_m = float(np.prod(high_m - low_m) / steep / MOST_CELLS) ** (1.0 / 3.0)
+    return max(fine_m, coarse_m) * np.array([1.0, 1.0, steep])
+
+
+def _is_free(mission: Mission, points_m: Array, start_m: Array, target_m: Array) -> BoolArray:
+    """(n,) whether a vehicle on its way from start to target may be at (n, 3) points."""
+    limits, solid = mission.limits, obstacles.pack(mission.world.as_known())
+    near_ends = np.minimum(lengths(points_m - start_m), lengths(points_m - target_m)) < mission.launch_zone_radius_m
+    clearance_m = np.where(near_ends, limits.body_radius_m, SPARE * limits.clearance_m)
+    height_m = np.where(near_ends, 0.0, limits.height_m)
+    high_enough = points_m[:, 2] - obstacles.terrain_height(points_m, solid) >= height_m
+    return high_enough & (obstacles.clearance(points_m, solid) >= clearance_m)
+
+
+def _graph(cells: IntArray, shape: IntArray, free: BoolArray, cell_m: Array) -> csr_array:
+    """Distances between neighbouring free cells, both ways."""
+    strides = np.array([shape[1] * shape[2], shape[2], 1])
+    starts, ends, weights = [], [], []
+    for step in STEPS:
+        there = cells + np.array(step)
+        inside = np.flatnonzero(free & np.all((there >= 0) & (there < shape), axis=1))
+        reached = inside + int(strides @ step)
+        both = free[reached]
+        starts.append(inside[both])
+        ends.append(reached[both])
+        weights.append(np.full(np.count_nonzero(both), np.linalg.norm(cell_m * step)))
+    ij = (np.concatenate(starts + ends), np.concatenate(ends + starts))
+    return csr_array((np.concatenate(weights + weights), ij), shape=(len(cells), len(cells)))
+
+
+def _taut(mission: Mission, path_m: Array, spacing_m: float) -> Array:
+    """The corners that remain when the path is pulled straight wherever nothing is in the way."""
+    kept, at = [0], 0
+    while at < len(path_m) - 1:
+        at = next(
+            end
+            for end in range(len(path_m) - 1, at, -1)
+            if end == at + 1 or _in_sight(mission, path_m, at, end, spacing_m)
+        )
+        kept.append(at)
+    return path_m[kept]
+
+
+def _in_sight(mission: Mission, path_m: Array, begin: int, end: int, spacing_m: float) -> bool:
+    leg = path_m[end] - path_m[begin]
+    if abs(leg[2]) > np.hypot(leg[0], leg[1]) * np.tan(np.radians(mission.limits.climb_angle_deg)):
+        return False
+    count = int(np.ceil(np.linalg.norm(leg) / spacing_m)) + 1
+    points_m = path_m[begin] + np.linspace(0.0, 1.0, count)[:, None] * leg
+    return bool(_is_free(mission, points_m, path_m[0], path_m[-1]).all())
