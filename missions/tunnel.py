@@ -62,6 +62,8 @@ class Reason(IntEnum):
     STOPPED_BY_OPERATOR = 8
     AUTOPILOT_LOST = 9
     INTERNAL_ERROR = 10
+    NOT_AIRBORNE = 11
+    """On the ground or disarmed: companions take over from hovering."""
 
 
 class TrajectoryMessage(msgspec.Struct, frozen=True, kw_only=True):
