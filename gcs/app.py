@@ -208,7 +208,7 @@ class FlightApp:
     def _write_report(self, reason: str) -> FlightReport:
         """Write `report.json` and `flight.png`."""
         flown = self._flown()
-        ends_s = [part.times_s[-1] for part in flown.values() if len(part.times_s)]
+        ends_s = [float(part.times_s[-1]) for part in flown.values() if len(part.times_s)]
         wall_s = time.monotonic() - self._started_s
         report = make_report(self.flight, flown, reason=reason, wall_s=wall_s, sim_s=max(ends_s, default=0.0))
         (self.work_dir / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")

@@ -19,6 +19,11 @@ FINAL_ACK_TIMEOUT_S = 1.5
 BUSY_PAUSE_S = 1.0
 MAX_ITEMS = 10_000
 
+_NOT_FINAL = {mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_ERROR}
+"""Acknowledgements that may be about something else: a PX4 answers a straggling item, or a repeated MISSION_COUNT,
+with ERROR, also while the present transfer is going well. What counts is whether the transfer goes on.
+"""
+
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 _KIND_NAMES = {MISSION: "mission", FENCE: "fence"}
@@ -101,8 +106,9 @@ class MissionUpload:
             if len(self._sent) == len(self.items):  # else: an old one
                 self.done = self.acknowledged = True
             return []
-        if message.type == mavlink.MAV_MISSION_ERROR and not self._sent and not self._backoff.exhausted:
-            self.deadline_s = now_s + BUSY_PAUSE_S  # busy with another transfer, which will end or time out
+        if message.type == mavlink.MAV_MISSION_ERROR:
+            if not self._sent:
+                self.deadline_s = now_s + BUSY_PAUSE_S  # busy with another transfer, which will end or time out
             return []
         self.done = True
         raise MissionTransferError(f"{self}: refused: {enum_name('MAV_MISSION_RESULT', message.type)}")
@@ -144,7 +150,7 @@ class MissionDownload:
                 self._count = message.count
             case "MISSION_ITEM_INT" if self._count is not None and message.seq == len(self.items):
                 self.items.append(item_content(message))
-            case "MISSION_ACK" if message.type != mavlink.MAV_MISSION_ACCEPTED:
+            case "MISSION_ACK" if message.type not in _NOT_FINAL:
                 self.done = True
                 raise MissionTransferError(f"{self}: refused: {enum_name('MAV_MISSION_RESULT', message.type)}")
             case _:

@@ -207,6 +207,18 @@ def test_a_busy_vehicle_is_asked_again_and_a_refusal_is_named():
         upload.receive(mission_ack(mavlink.MAV_MISSION_NO_SPACE), 2.0)
 
 
+def test_an_error_about_a_straggler_does_not_end_a_transfer():
+    upload = MissionUpload(ITEMS, PEER)
+    upload.start(0.0)
+    upload.receive(request(0), 0.1)
+    upload.receive(mission_ack(mavlink.MAV_MISSION_ERROR), 0.2)
+    assert sent(upload.receive(request(1), 0.3)) == ["MISSION_ITEM_INT"]
+    download = MissionDownload(PEER)
+    download.start(0.0)
+    download.receive(mission_ack(mavlink.MAV_MISSION_ERROR), 0.1)
+    assert not download.done
+
+
 def test_requests_beyond_the_end_are_ignored():
     upload = MissionUpload(ITEMS, PEER)
     upload.start(0.0)

@@ -1,0 +1,78 @@
+"""The ground station's mission client against the simulator's server, written apart, on a link that loses."""
+
+import asyncio
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gcs.errors import MissionTransferError
+from gcs.flight.upload import first_difference, store
+from gcs.microservices.mission_transfer_client import FENCE, MISSION, MissionDownload
+from missions.mission import LinkSettings, load_mission
+from missions.mission_items import MissionItem
+from tests.simulation import virtual_time
+from tests.simulation.whole_system import WholeSystem
+
+INDOOR = load_mission("indoor")
+
+
+def system_with(link: LinkSettings, seed: int) -> WholeSystem:
+    simulation = msgspec.structs.replace(INDOOR.simulation, ground_link=link)
+    return WholeSystem(msgspec.structs.replace(INDOOR, simulation=simulation), seed=seed)
+
+
+def waypoints(n: int, seed: int) -> list[MissionItem]:
+    origin = INDOOR.origin
+    lat_e7, lon_e7 = round(origin.latitude_deg * 1e7), round(origin.longitude_deg * 1e7)
+    return [
+        MissionItem(command=16, param2=0.3, x=lat_e7 + 10 * i + seed, y=lon_e7 - 7 * i, z=490.0 + i % 9)
+        for i in range(n)
+    ]
+
+
+def vertices(n: int) -> list[MissionItem]:
+    return [msgspec.structs.replace(item, command=5001, param1=float(n), param2=0.0) for item in waypoints(n, 0)]
+
+
+async def transfer(system: WholeSystem, items: list[MissionItem], kind: int) -> list[MissionItem] | None:
+    """Store items on vehicle 1; what is really there afterwards, or None if the client gave up."""
+    simulating = asyncio.create_task(system.simulate())
+    await asyncio.sleep(1.5)
+    try:
+        await store(system.station, 1, items, kind)
+        return (await system.station.run(MissionDownload((1, 1), kind))).items
+    except MissionTransferError:
+        return None
+    finally:
+        simulating.cancel()
+
+
+@pytest.mark.parametrize(("kind", "items"), [(MISSION, waypoints(12, 0)), (FENCE, vertices(4))])
+def test_on_a_good_link_missions_and_fences_are_stored_as_sent(kind: int, items: list[MissionItem]):
+    stored = virtual_time.run(transfer(system_with(LinkSettings(), 0), items, kind))
+    assert stored is not None
+    assert first_difference(items, stored, compare_altitude=kind == MISSION) == ""
+
+
+@given(
+    n=st.integers(1, 12),
+    loss=st.floats(0.0, 0.35),
+    delay_s=st.sampled_from([0.0, 0.05, 0.25]),
+    seed=st.integers(0, 10**6),
+)
+@settings(max_examples=25, deadline=None)
+def test_what_the_client_calls_stored_is_stored_whatever_is_lost(n: int, loss: float, delay_s: float, seed: int):
+    system = system_with(LinkSettings(loss=loss, delay_s=delay_s, jitter_s=delay_s / 2), seed)
+    items = waypoints(n, seed % 100)
+    stored = virtual_time.run(transfer(system, items, MISSION))
+    if stored is not None:
+        assert first_difference(items, stored) == ""
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_ten_percent_loss_does_not_keep_a_mission_from_being_stored(seed: int):
+    system = system_with(LinkSettings(loss=0.1, delay_s=0.05), seed)
+    stored = virtual_time.run(transfer(system, waypoints(10, 0), MISSION))
+    assert stored is not None

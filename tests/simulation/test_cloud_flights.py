@@ -1,0 +1,64 @@
+"""Whole flights in cloud mode, in process: the autopilots fly the uploaded missions themselves."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from missions.mission import LinkSettings, Mission, load_mission
+from tests.simulation.whole_system import WholeSystem
+
+INDOOR = load_mission("indoor")
+
+
+def on_a_bad_link(mission: Mission, **link: float) -> Mission:
+    simulation = msgspec.structs.replace(mission.simulation, ground_link=LinkSettings(**link))
+    return msgspec.structs.replace(mission, simulation=simulation)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_both_drones_cross_the_room_and_land_at_their_targets(seed: int):
+    report = WholeSystem(INDOOR, seed=seed).fly()
+    assert report.success, report.reason
+    for vehicle in report.vehicles:
+        assert vehicle.landed
+        assert vehicle.target_error_m < 0.5
+        assert vehicle.min_clearance_m > 0.3
+        assert vehicle.link.lost == 0
+    assert report.min_separation_m is not None
+    assert report.min_separation_m > 0.6
+
+
+def test_one_seed_is_one_flight_to_the_bit():
+    one, other = WholeSystem(INDOOR, seed=4), WholeSystem(INDOOR, seed=4)
+    assert one.fly() == other.fly()
+    np.testing.assert_array_equal(one.flown()[1].positions_m, other.flown()[1].positions_m)
+    assert [event.text for event in one.events.events] == [event.text for event in other.events.events]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bad_link_delays_a_flight_and_changes_nothing_else(seed: int):
+    report = WholeSystem(on_a_bad_link(INDOOR, loss=0.15, delay_s=0.1, jitter_s=0.05), seed=seed).fly()
+    assert report.success, report.reason
+    assert sum(vehicle.link.lost for vehicle in report.vehicles) > 0
+
+
+def test_a_link_cut_in_mid_flight_does_not_end_it():
+    report = WholeSystem(load_mission("indoor-link-loss"), seed=1).fly()
+    assert report.success, report.reason
+
+
+def test_a_vehicle_that_stands_elsewhere_is_not_armed():
+    elsewhere = WholeSystem(INDOOR)
+    moved = msgspec.structs.replace(INDOOR.vehicles[1], pad_m=(1.0, 10.5, 0.0))
+    elsewhere.mission = msgspec.structs.replace(INDOOR, vehicles=(INDOOR.vehicles[0], moved))
+    report = elsewhere.fly()
+    assert not report.success
+    assert "bravo (vehicle 2): stands 2.0 m from its pad" in report.reason
+    assert not any(state.armed for state in elsewhere.station.fleet.vehicles.values())
+
+
+def test_without_the_missions_consent_no_parameter_is_touched():
+    report = WholeSystem(msgspec.structs.replace(INDOOR, set_parameters=False)).fly()
+    assert not report.success
+    assert "COM_OBL_RC_ACT is 0, expected 5" in report.reason
+    assert "set_parameters: true" in report.reason
