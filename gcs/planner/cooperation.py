@@ -43,6 +43,11 @@ class Cooperation:
                 costs = self._costs(vehicle, self._first)
                 self._enter(vehicle, self._first[int(np.argmin(costs))])
 
+    @property
+    def curves_per_round(self) -> int:
+        """Evaluations of single curves that the next round takes."""
+        return sum(1 + (1 + self._settings.window) * len(swarm.memory) for swarm in self._swarms)
+
     def round(self) -> None:
         """Let every swarm search for one window of iterations, and take over what is better than the present plan."""
         for vehicle, swarm in enumerate(self._swarms):

@@ -67,8 +67,8 @@ class Violation:
     def __str__(self) -> str:
         limit, where = self.limit, f" {self.where}" if self.where else ""
         return (
-            f"{self.vehicle}: {limit.title} {self.found:.4g} {limit.unit}{where}, "
-            f"required is {limit.sense} {self.required:.4g} {limit.unit}"
+            f"{self.vehicle}: {limit.title} {_number(self.found)} {limit.unit}{where}, "
+            f"required is {limit.sense} {_number(self.required)} {limit.unit}"
         )
 
 
@@ -162,6 +162,10 @@ class FleetPlan:
         document["convergence"] = [progress.objective for progress in self.convergence]
         document["vehicles"] = [_vehicle_as_json(vehicle) for vehicle in self.vehicles]
         return json.dumps(document)
+
+
+def _number(value: float) -> str:
+    return f"{value:.3f}".rstrip("0").rstrip(".")
 
 
 def _violation_as_json(violation: Violation) -> dict[str, Any]:

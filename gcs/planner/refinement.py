@@ -47,7 +47,9 @@ class Refined:
     evaluations: int
 
 
-def refine(problem: Problem, offsets: Array, stages: tuple[Stage, ...], should_stop: Callable[[], bool]) -> Refined:
+def refine(
+    problem: Problem, offsets: Array, stages: tuple[Stage, ...], most: int, should_stop: Callable[[], bool]
+) -> Refined:
     """Improve a plan, ever more strictly.
 
     Light penalties let the optimiser cut through limits towards a good plan; each stricter stage starts from what the
@@ -57,15 +59,16 @@ def refine(problem: Problem, offsets: Array, stages: tuple[Stage, ...], should_s
         problem: what is planned.
         offsets: (vehicles, 2 (n - 2)) to start from.
         stages: in order.
+        most: evaluations in all; one is always made.
         should_stop: asked after every step; the best so far is returned then.
     """
     evaluations, gradient = 0, np.empty_like(offsets)
     for stage in stages:
-        weighed = stricter(problem, stage.strictness)
-        offsets, taken = _descend(weighed, offsets, stage.evaluations, should_stop)
-        evaluations += taken
-        if should_stop():
+        allowed = min(stage.evaluations, most - 1 - evaluations)
+        if allowed <= 0 or should_stop():
             break
+        offsets, taken = _descend(stricter(problem, stage.strictness), offsets, allowed, should_stop)
+        evaluations += taken
     objective, violation = fleet_cost(problem, offsets, gradient)
     return Refined(offsets, objective, violation, evaluations + 1)
 

@@ -6,6 +6,7 @@ the samples that the search looks at, it looks closer from then on and keeps far
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +28,8 @@ QUICK = (Stage(1.0, 40), Stage(10.0, 20), Stage(100.0, 20))
 """Polish of the first particles: a feasible plan soon."""
 THOROUGH = (Stage(1.0, 60), Stage(10.0, 40), Stage(100.0, 20))
 """Polish of what a round of the swarms has found."""
+MEND = (Stage(1000.0, 40),)
+"""Polish of a plan that is all but feasible."""
 LOOKS_FEASIBLE = 1e-4
 """A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge ..."""
 SHOULD_BE_FEASIBLE = 1e-6
@@ -39,6 +42,14 @@ MERIT_STRICTNESS = 100.0
 """Two polished plans are compared with violations weighing so many times more than in the search."""
 MOST_RAISES = 3
 """How often the search may be made more careful."""
+
+
+@dataclass(frozen=True)
+class Approved:
+    """A plan without violations, and what it costs the search (eq. 13, and what slow flight costs)."""
+
+    candidate: Candidate
+    cost: float
 
 
 class FleetSearch:
@@ -62,7 +73,7 @@ class FleetSearch:
         self._problem = pose(mission, routes, self._guides, self._care)
         self._swarms = Cooperation(self._problem, self._settings, np.random.default_rng(seed))
         self._present: Refined | None = None
-        self._best: Candidate | None = None
+        self._best: Approved | None = None
         self._polishes = self._iterations = 0
         self.convergence: list[Progress] = []
 
@@ -72,41 +83,50 @@ class FleetSearch:
         return self._polishes + self._swarms.curve_evaluations / len(self._routes)
 
     def run(self) -> Candidate:
-        """Search until the budget is used up: the best plan that the judge found feasible, or the least bad one."""
+        """Search until the budget is used up: the best plan that the judge approved, or the least bad one."""
         self._swarms.start()
         self._polish(QUICK)
         self._report()
         while self._budget.share_done(self.evaluations) < 1.0 and not self._budget.interrupted():
-            self._swarms.round()
-            self._iterations += self._settings.window
+            if self._budget.left(self.evaluations) > self._swarms.curves_per_round / len(self._routes):
+                self._swarms.round()
+                self._iterations += self._settings.window
             self._polish(THOROUGH)
             if self._best is None and self._iterations == PATIENCE * self._settings.window:
                 self._find_ways_around()
             self._report()
         assert self._present is not None
+        if self._best is not None and self._best.cost <= self._present.objective:
+            return self._best.candidate
         last = self._judged(self._present.offsets)
-        if self._best is None or (not last.violations and last.objective < self._best.objective):
-            return last
-        return self._best
+        return last if self._best is None or not last.violations else self._best.candidate
 
     def _polish(self, stages: tuple[Stage, ...]) -> None:
         """Polish the swarms' plan; take it over if it is better than the present one, and let the judge see it."""
-        refined = refine(self._problem, self._swarms.offsets, stages, self._budget.interrupted)
-        self._polishes += refined.evaluations
-        if self._present is None or self._merit(refined) < self._merit(self._present):
+        refined = self._refined(self._swarms.offsets, stages)
+        improved = self._present is None or self._merit(refined) < self._merit(self._present)
+        if self._present is None or improved:
             self._present = refined
         self._swarms.adopt(self._present.offsets)
-        enough = np.inf if self._best is None else self._best.objective - WORTH_JUDGING * abs(self._best.objective)
-        if self._present is refined and refined.violation < LOOKS_FEASIBLE and refined.objective < enough:
+        enough = np.inf if self._best is None else self._best.cost - WORTH_JUDGING * abs(self._best.cost)
+        if improved and refined.violation < LOOKS_FEASIBLE and refined.objective < enough:
             self._show_judge(refined)
+
+    def _refined(self, offsets: Array, stages: tuple[Stage, ...]) -> Refined:
+        left = self._budget.left(self.evaluations)
+        refined = refine(self._problem, offsets, stages, left, self._budget.interrupted)
+        self._polishes += refined.evaluations
+        return refined
 
     def _show_judge(self, refined: Refined) -> None:
         candidate = self._judged(refined.offsets)
-        if not candidate.violations:
-            if self._best is None or candidate.objective < self._best.objective:
-                self._best = candidate
-        elif refined.violation < SHOULD_BE_FEASIBLE:
+        if candidate.violations and refined.violation > SHOULD_BE_FEASIBLE:
+            self._present = refined = self._refined(refined.offsets, MEND)
+            candidate = self._judged(refined.offsets)
+        if candidate.violations:
             self._look_closer()
+        elif self._best is None or refined.objective < self._best.cost:
+            self._best = Approved(candidate, refined.objective)
 
     def _find_ways_around(self) -> None:
         """Give vehicles that cannot even fly alone a guide path around what is in their way, and start afresh."""
@@ -144,9 +164,8 @@ class FleetSearch:
 
     def _report(self) -> None:
         assert self._present is not None
-        feasible = self._best is not None
-        found = self._best.objective if self._best is not None else self._merit(self._present)
+        found = self._merit(self._present) if self._best is None else self._best.candidate.objective
         share_done = self._budget.share_done(self.evaluations)
-        progress = Progress(self._iterations, int(self.evaluations), found, feasible, share_done)
+        progress = Progress(self._iterations, int(self.evaluations), found, self._best is not None, share_done)
         self.convergence.append(progress)
         self._on_progress(progress)

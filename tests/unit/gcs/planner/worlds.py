@@ -1,0 +1,59 @@
+"""Missions for the planner's tests: rooms with walls, and one world that has an obstacle of every kind."""
+
+import msgspec
+
+from missions.mission import Mission, Target, Vehicle, contradictions, load_mission
+from missions.world import Bounds, Box, Cylinder, Peak, Point3, Threat, World
+
+ROOM = Bounds(east_m=(0.0, 20.0), north_m=(0.0, 15.0), up_m=(0.0, 4.0))
+
+
+def wall(east_m: float, gap_m: tuple[float, float] | None) -> tuple[Box, ...]:
+    """A wall across the room from floor to ceiling, with a gap from one northing to another."""
+    parts = [(0.0, 15.0)] if gap_m is None else [(0.0, gap_m[0]), (gap_m[1], 15.0)]
+    return tuple(
+        Box(
+            name=f"wall-{east_m:g}-{low:g}",
+            centre_m=(east_m, 0.5 * (low + high), 2.0),
+            half_m=(0.15, 0.5 * (high - low), 2.0),
+        )
+        for low, high in parts
+    )
+
+
+def room(
+    boxes: tuple[Box, ...] = (),
+    pads_m: tuple[Point3, ...] = ((1.0, 6.0, 0.0), (1.0, 8.0, 0.0)),
+    targets_m: tuple[Point3, ...] = ((19.0, 6.0, 1.5), (19.0, 8.0, 1.5)),
+    **changes: object,
+) -> Mission:
+    """The indoor mission in another room; `changes` are fields of `Limits`."""
+    indoor = load_mission("indoor")
+    mission = msgspec.structs.replace(
+        indoor,
+        name="room",
+        world=World(bounds=ROOM, boxes=boxes),
+        vehicles=tuple(Vehicle(name=f"v{i + 1}", sysid=i + 1, pad_m=pad) for i, pad in enumerate(pads_m)),
+        targets=tuple(Target(name=f"t{i + 1}", position_m=place) for i, place in enumerate(targets_m)),
+        allocation=None,
+        limits=msgspec.structs.replace(indoor.limits, **changes),
+    )
+    assert not list(contradictions(mission))
+    return mission
+
+
+def everything(**changes: object) -> Mission:
+    """A terrain with peaks, threats, a box and a cylinder, and three vehicles through the middle of them."""
+    terrain = load_mission("terrain-1-5uav")
+    world = World(
+        bounds=terrain.world.bounds,
+        peaks=(
+            Peak(name="hill", centre_m=(600.0, 300.0), radius_m=200.0),
+            Peak(name="spike", centre_m=(1300.0, 700.0), radius_m=100.0, height_m=700.0),
+        ),
+        threats=(Threat(name="radar", centre_m=(1000.0, 900.0), radius_m=300.0),),
+        boxes=(Box(name="block", centre_m=(1500.0, 400.0, 150.0), half_m=(60.0, 200.0, 150.0)),),
+        cylinders=(Cylinder(name="tower", centre_m=(400.0, 700.0), radius_m=80.0, base_m=100.0, top_m=600.0),),
+    )
+    mission = msgspec.structs.replace(terrain, name="everything", world=world, **changes)
+    return msgspec.structs.replace(mission, vehicles=terrain.vehicles[:3], targets=terrain.targets[:3])
