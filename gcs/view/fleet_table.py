@@ -1,0 +1,121 @@
+"""The fleet as one HTML table: state in, text out; pure."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from gcs.desk import Desk
+from gcs.flight.monitor import VehicleMonitor
+from gcs.view import words
+from gcs.view.colours import Rgb, Tone, css
+from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
+from gcs.view.words import NOTHING
+
+HEADINGS = ("Vehicle", "Mode", "Phase", "Battery", "Height", "Speed", "To target", "Companion", "Replan", "Link")
+
+FEW = 6
+"""Vehicles up to which there is room for air between the rows."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One vehicle; words come with their tone, numbers in SI units, NaN where there is none."""
+
+    name: str
+    colour: Rgb
+    selected: bool
+    mode: tuple[str, Tone] = ("not heard", Tone.QUIET)
+    phase: tuple[str, Tone] = (NOTHING, Tone.QUIET)
+    reason: str = ""
+    battery_percent: float = math.nan
+    height_m: float = math.nan
+    speed_m_s: float = math.nan
+    to_target_m: float = math.nan
+    companion: tuple[str, Tone] = (NOTHING, Tone.QUIET)
+    replan_ms: float = math.nan
+    link: tuple[str, Tone] = (NOTHING, Tone.QUIET)
+
+
+def rows(desk: Desk, seen: Iterable[Sighting], selected: set[int], now_s: float) -> list[Row]:
+    """One row per vehicle of the mission, and of whoever else was heard."""
+    names, places = vehicle_names(desk), {sighting.sysid: sighting for sighting in seen}
+    colours = vehicle_colours(names)
+    return [_row(desk, sysid, names[sysid], colours[sysid], places, selected, now_s) for sysid in names]
+
+
+def render(table: Sequence[Row]) -> str:
+    """The table; a large fleet's rows stand closer."""
+    head = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
+    body = "".join(_render_row(row) for row in table)
+    many = " many" if len(table) > FEW else ""
+    return f'<div class="gcs-fleet{many}"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _row(
+    desk: Desk, sysid: int, name: str, colour: Rgb, places: dict[int, Sighting], selected: set[int], now_s: float
+) -> Row:
+    state = desk.vehicles.get(sysid)
+    if state is None:
+        return Row(name, colour, sysid in selected)
+    part = desk.flight.vehicles.get(sysid) if desk.flight is not None else None
+    monitor = part.monitor if part is not None else None
+    sighting, status = places.get(sysid), state.companion.status
+    return Row(
+        name,
+        colour,
+        sysid in selected,
+        mode=words.mode_words(state, now_s),
+        phase=words.phase_words(monitor.phase if monitor else None, monitor is not None and monitor.reached),
+        reason=monitor.reason if monitor else "",
+        battery_percent=state.battery_percent,
+        height_m=float(sighting.position_m[2]) if sighting else math.nan,
+        speed_m_s=float(np.linalg.norm(state.velocity_enu_m_s)) if sighting else math.nan,
+        to_target_m=_distance_m(sighting, monitor),
+        companion=words.companion_words(state, now_s),
+        replan_ms=status.replan_p50_ms if status is not None and status.replans else math.nan,
+        link=words.age_words(now_s - state.telemetry_s),
+    )
+
+
+def _distance_m(sighting: Sighting | None, monitor: VehicleMonitor | None) -> float:
+    if sighting is None or monitor is None:
+        return math.nan
+    return float(np.linalg.norm(sighting.position_m - np.array(monitor.target.position_m)))
+
+
+def _render_row(row: Row) -> str:
+    cells = (
+        f'<td class="name"><s style="background:{css(row.colour)}"></s>{escape(row.name)}</td>',
+        _words(row.mode),
+        _words(row.phase, row.reason),
+        _battery(row.battery_percent),
+        _number(row.height_m, "m"),
+        _number(row.speed_m_s, "m/s"),
+        _number(row.to_target_m, "m"),
+        _words(row.companion),
+        _number(row.replan_ms, "ms"),
+        _words(row.link),
+    )
+    selected = ' class="selected"' if row.selected else ""
+    return f"<tr{selected}>{''.join(cells)}</tr>"
+
+
+def _words(words_and_tone: tuple[str, Tone], title: str = "") -> str:
+    text, tone = words_and_tone
+    hover = f' title="{escape(title)}"' if title else ""
+    return f'<td{hover}><i class="{tone.value}">{escape(text)}</i></td>'
+
+
+def _battery(percent: float) -> str:
+    if math.isnan(percent):
+        return f"<td>{NOTHING}</td>"
+    tone = words.battery_tone(percent).value
+    return f'<td><em class="{tone}"><q style="width:{percent:.0f}%"></q></em>{percent:.0f} %</td>'
+
+
+def _number(value: float, unit: str) -> str:
+    text = words.number_words(value)
+    return f"<td>{text}</td>" if text == NOTHING else f"<td>{text}<small> {unit}</small></td>"

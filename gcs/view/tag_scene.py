@@ -1,0 +1,86 @@
+"""Name tags of vehicles and targets as they are drawn: upright, of one size, on stems, clear of each other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from gcs.view.colours import Rgb
+from gcs.view.labels import Lens, lifts_px, tag_width_px
+
+Array = npt.NDArray[np.float64]
+
+STEM_WIDTH_PX = 1.0
+BLIND_LIFT_M = 0.4
+"""How far up a tag stands as long as no camera is known."""
+
+
+@dataclass(frozen=True)
+class Tag:
+    """A name tag: `key` stays the same while text and place change."""
+
+    key: str
+    text: str
+    anchor_m: Array
+    colour: Rgb
+    span_px: float
+    """How large what is named is in the picture."""
+    scale: float = 1.0
+
+
+class TagScene:
+    """All tags.
+
+    Args:
+        scene: of the page.
+    """
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._labels: dict[str, viser.LabelHandle] = {}
+        self._stems: viser.LineSegmentsHandle | None = None
+        self._lifts_px = np.zeros(0)
+
+    def show(self, tags: Sequence[Tag], lens: Lens | None) -> None:
+        """Bring texts up to date, and settle anew how far up each tag stands."""
+        if [tag.key for tag in tags] != list(self._labels):
+            self._build(tags)
+        for tag in tags:
+            self._labels[tag.key].text = tag.text
+        self._lifts_px = np.zeros(len(tags))
+        if lens is not None and tags:
+            anchors_px = lens.project(np.array([tag.anchor_m for tag in tags]))
+            widths_px = [tag_width_px(tag.text) * tag.scale for tag in tags]
+            self._lifts_px = lifts_px(anchors_px, widths_px, [tag.span_px for tag in tags])
+
+    def move(self, tags: Sequence[Tag], lens: Lens | None) -> None:
+        """Bring the tags to where what they name is now."""
+        if self._stems is None or [tag.key for tag in tags] != list(self._labels):
+            return
+        anchors_m = np.array([tag.anchor_m for tag in tags])
+        feet_m = anchors_m + self._lifts_m(anchors_m, lens)
+        for tag, foot_m in zip(tags, feet_m, strict=True):
+            self._labels[tag.key].position = foot_m
+        self._stems.points = np.stack((anchors_m, feet_m), axis=1).astype(np.float32)
+
+    def _lifts_m(self, anchors_m: Array, lens: Lens | None) -> Array:
+        if lens is None:
+            return np.broadcast_to([0.0, 0.0, BLIND_LIFT_M], anchors_m.shape)
+        return (self._lifts_px * lens.metres_per_pixel(anchors_m))[:, None] * lens.up
+
+    def _build(self, tags: Sequence[Tag]) -> None:
+        for label in self._labels.values():
+            label.remove()
+        self._labels = {
+            tag.key: self._scene.add_label(
+                f"/tags/{tag.key}", tag.text, font_screen_scale=tag.scale, anchor="bottom-center"
+            )
+            for tag in tags
+        }
+        nowhere = np.zeros((len(tags), 2, 3))
+        colours = np.array([[tag.colour] * 2 for tag in tags], dtype=np.uint8).reshape(-1, 2, 3)
+        self._stems = self._scene.add_line_segments(
+            "/tags/stems", nowhere, colours, thickness=STEM_WIDTH_PX, thickness_units="screen", visible=bool(tags)
+        )

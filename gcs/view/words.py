@@ -1,0 +1,89 @@
+"""What the page calls the states of vehicles and companions, and in which tone; pure."""
+
+import math
+
+from gcs.dialect import Mode
+from gcs.fleet.vehicle_state import VehicleState
+from gcs.flight.monitor import Phase
+from gcs.view.colours import Tone
+from missions.tunnel import CompanionState, Reason
+
+NOTHING = "–"
+
+_CALM_MODES = {Mode.OFFBOARD, Mode.MISSION, Mode.TAKEOFF}
+_COMPANION_TONES = {
+    CompanionState.READY: Tone.INFO,
+    CompanionState.ENGAGING: Tone.GOOD,
+    CompanionState.FLYING: Tone.GOOD,
+    CompanionState.LANDING: Tone.GOOD,
+    CompanionState.FINISHED: Tone.INFO,
+    CompanionState.HOLDING: Tone.WARN,
+    CompanionState.RELEASED: Tone.WARN,
+    CompanionState.FAILED: Tone.BAD,
+}
+_PHASE_TONES = {
+    Phase.WAITING: Tone.QUIET,
+    Phase.PREPARED: Tone.INFO,
+    Phase.INTERRUPTED: Tone.WARN,
+    Phase.COMING_DOWN: Tone.WARN,
+}
+
+
+def number_words(value: float) -> str:
+    """A number with one decimal below a hundred and none above, so that it does not change without meaning."""
+    if not math.isfinite(value):
+        return NOTHING
+    text = f"{value:.1f}" if abs(value) < 99.95 else f"{value:.0f}"
+    return "0.0" if text == "-0.0" else text
+
+
+def mode_words(state: VehicleState, now_s: float) -> tuple[str, Tone]:
+    """The vehicle's mode, or what matters more: that it is lost or in a failsafe."""
+    if not state.online(now_s):
+        return "Lost", Tone.BAD
+    name = state.mode.name.replace("_", " ").capitalize() if len(state.mode.name) > 3 else state.mode.name
+    if state.failsafe:
+        return f"{name} (failsafe)", Tone.BAD
+    if not state.armed:
+        return name, Tone.QUIET
+    return name, Tone.GOOD if state.mode in _CALM_MODES else Tone.WARN
+
+
+def phase_words(phase: Phase | None, reached: bool) -> tuple[str, Tone]:
+    """Where a vehicle is in its flight."""
+    if phase is None:
+        return NOTHING, Tone.QUIET
+    if phase is Phase.DONE:
+        return ("reached", Tone.GOOD) if reached else ("ended", Tone.WARN)
+    return phase.value, _PHASE_TONES.get(phase, Tone.GOOD)
+
+
+def companion_words(state: VehicleState, now_s: float) -> tuple[str, Tone]:
+    """What the vehicle's companion is doing."""
+    status = state.companion.status
+    if math.isinf(state.companion.heard_s):
+        return NOTHING, Tone.QUIET
+    if not state.companion_online(now_s):
+        return "silent", Tone.BAD
+    if status is None:
+        return "heard", Tone.QUIET
+    tone = _COMPANION_TONES.get(status.state, Tone.QUIET)
+    if (status.state, status.reason) == (CompanionState.HOLDING, Reason.TARGET_REACHED):
+        tone = Tone.GOOD
+    return status.state.name.lower(), tone
+
+
+def battery_tone(percent: float) -> Tone:
+    """How full a battery is."""
+    if percent < 20.0:
+        return Tone.BAD
+    return Tone.WARN if percent < 40.0 else Tone.GOOD
+
+
+def age_words(age_s: float) -> tuple[str, Tone]:
+    """How long ago a vehicle was heard: in steps, so that a live link stands still."""
+    if math.isinf(age_s):
+        return NOTHING, Tone.QUIET
+    if age_s < 1.0:
+        return "live", Tone.GOOD
+    return f"{age_s:.0f} s", Tone.WARN if age_s < 3.0 else Tone.BAD

@@ -1,0 +1,25 @@
+"""Browser tests need a Chromium: without one they are left out, loudly, or fail where REQUIRE_BROWSER=1 is set."""
+
+import os
+
+import pytest
+
+from tests.browser.chromium import find_chromium
+
+REQUIRED = os.environ.get("REQUIRE_BROWSER") == "1"
+ADVICE = "no Chromium was found (tried $CHROMIUM, chromium, google-chrome and playwright's own)"
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    in_browser = [item for item in items if item.get_closest_marker("browser")]
+    if not in_browser or find_chromium() is not None:
+        return
+    if REQUIRED:
+        raise pytest.UsageError(f"REQUIRE_BROWSER=1 is set, but {ADVICE}")
+    config.hook.pytest_deselected(items=in_browser)
+    items[:] = [item for item in items if item not in in_browser]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    if find_chromium() is None:
+        terminalreporter.write_sep("!", f"browser tests were LEFT OUT: {ADVICE}", red=True, bold=True)
