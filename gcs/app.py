@@ -66,7 +66,8 @@ class FlightApp:
             unattended=page is None,
         )
         self.flight, self.station, self.events = flight, station, events
-        self.desk = Desk(station, events, flight, Trails(mission.frame))
+        simulated = settings.autopilots is Autopilots.SIMULATED
+        self.desk = Desk(station, events, flight, Trails(mission.frame), simulated=simulated)
         self.report: FlightReport | None = None
         self._started_s = time.monotonic()
 

@@ -5,11 +5,12 @@ whether it can be done now, and if not, why.
 """
 
 import asyncio
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from gcs.dialect import AUTOPILOT, Mode
+from gcs.dialect import AUTOPILOT, Mode, mavlink
 from gcs.errors import GcsError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions
@@ -60,9 +61,12 @@ class Desk:
     """Of the plan that is being made, or was made last."""
     running: Intent | None = None
     """The step of the whole flight that is under way."""
+    simulated: bool = False
+    """The vehicles fly in the bundled simulator, so what the mission keeps from its planners is there, too."""
 
     def __post_init__(self) -> None:
         self._tasks: set[asyncio.Task[None]] = set()
+        self._texts_heard_s: dict[int, float] = {}
 
     @property
     def mission(self) -> Mission | None:
@@ -76,6 +80,15 @@ class Desk:
         if self.plan_progress and progress.evaluations < self.plan_progress[-1].evaluations:
             self.plan_progress.clear()
         self.plan_progress.append(progress)
+
+    def collect_texts(self) -> None:
+        """Take what the autopilots have said since the last call into the event log."""
+        for sysid, state in self.vehicles.items():
+            heard_s = self._texts_heard_s.get(sysid, -math.inf)
+            name = self._name(sysid)
+            for said in [text for text in state.texts if text.time_s > heard_s]:
+                self.events.add("said", said.text, name, _severity(said.severity))
+                self._texts_heard_s[sysid] = said.time_s
 
     def why_not(self, intent: Intent, sysids: Iterable[int] = ()) -> str | None:
         """Why an intent cannot be done now, as a phrase; None if it can."""
@@ -163,6 +176,10 @@ class Desk:
     def _part(self, sysid: int) -> VehicleFlight | None:
         return self.flight.vehicles.get(sysid) if self.flight else None
 
+    def _name(self, sysid: int) -> str:
+        planned = self.mission.vehicles if self.mission is not None else ()
+        return next((vehicle.name for vehicle in planned if vehicle.sysid == sysid), f"vehicle {sysid}")
+
     def _why_not_fleet(self, intent: Intent) -> str | None:
         if self.flight is None:
             return "no mission is loaded"
@@ -187,3 +204,10 @@ class Desk:
             return "nothing was interrupted"
         already = {Intent.HOLD: Mode.HOLD, Intent.RTL: Mode.RTL, Intent.LAND: Mode.LAND}.get(intent)
         return f"already in {state.mode.name.lower()}" if already is state.mode else None
+
+
+def _severity(mav_severity: int) -> Severity:
+    """Of a STATUSTEXT: MAV_SEVERITY counts downwards from 7, debug."""
+    if mav_severity <= mavlink.MAV_SEVERITY_ERROR:
+        return Severity.ERROR
+    return Severity.WARNING if mav_severity == mavlink.MAV_SEVERITY_WARNING else Severity.INFO

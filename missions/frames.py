@@ -125,3 +125,11 @@ def rotation_enu_from_flu(quaternion_ned_frd: Array) -> Array:
         ]
     )
     return swap_enu_ned((ned_from_frd * np.array([1.0, -1.0, -1.0])).T).T
+
+
+def quaternion_enu_from_flu(quaternion_ned_frd: Array) -> Array:
+    """(..., 4) unit quaternions (w, x, y, z; FLU -> ENU) of MAVLink attitudes (w, x, y, z; FRD -> NED)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion_ned_frd, dtype=float), -1, 0)
+    # q_enu_ned * q * q_frd_flu, with q_enu_ned = (0, 1, 1, 0) / sqrt(2) and q_frd_flu = (0, 1, 0, 0)
+    turned = np.stack((w + z, x + y, x - y, w - z), axis=-1)
+    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)

@@ -28,9 +28,9 @@ class Trail:
         self._positions_m.append(position_m)
         self._velocities_m_s.append(velocity_m_s)
 
-    def positions_m(self) -> Array:
-        """(n, 3) ENU [m]."""
-        return np.array(self._positions_m).reshape(-1, 3)
+    def positions_m(self, first: int = 0) -> Array:
+        """(n, 3) ENU [m], from sample `first` on."""
+        return np.array(self._positions_m[first:]).reshape(-1, 3)
 
     def velocities_m_s(self) -> Array:
         """(n, 3) ENU [m/s]."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,6 +12,7 @@ from missions.frames import (
     GeodeticPoint,
     LocalFrame,
     heading_rad,
+    quaternion_enu_from_flu,
     rotation_enu_from_flu,
     swap_enu_ned,
 )
@@ -98,3 +100,10 @@ def test_a_level_body_heading_east_points_its_nose_east_and_its_left_side_north(
 def test_a_body_that_pitches_up_lifts_its_nose():
     pitch_up = np.array([np.cos(0.1), 0.0, np.sin(0.1), 0.0])  # 0.2 rad about the right-hand axis
     assert (rotation_enu_from_flu(pitch_up) @ [1, 0, 0])[2] == pytest.approx(np.sin(0.2))
+
+
+def test_the_quaternion_for_drawing_is_the_rotation_from_the_body_to_enu():
+    attitudes = np.random.default_rng(1).normal(size=(20, 4))
+    for attitude, (w, x, y, z) in zip(attitudes, quaternion_enu_from_flu(attitudes), strict=True):
+        drawn = Rotation.from_quat([x, y, z, w]).as_matrix()
+        np.testing.assert_allclose(drawn, rotation_enu_from_flu(attitude), atol=1e-12)
