@@ -82,6 +82,13 @@ class Adjoint(NamedTuple):
     """(m - 1,) by the lengths of the polygon's sides."""
 
 
+@compiled
+def new_adjoint(n_samples: int) -> Adjoint:
+    """Room for the derivatives of a curve with so many samples; with none, for no derivatives."""
+    by_point, by_slope, by_bend = np.empty((n_samples, 3)), np.empty((n_samples, 3)), np.empty((n_samples, 3))
+    return Adjoint(by_point, by_slope, by_bend, np.empty(max(n_samples - 1, 0)))
+
+
 def sampling(n_control: int, n_samples: int) -> Sampling:
     """Samples at equal steps of the parameter of a clamped cubic with `n_control` control points."""
     u = np.linspace(0.0, 1.0, n_samples)
@@ -102,7 +109,6 @@ def curve_cost(
     points_m: Array,
     chords_m: Array,
     adjoint: Adjoint,
-    with_gradient: bool,
 ) -> tuple[float, float]:
     """Objective (eq. 13, and what slow flight costs) and sum of the squared violations of one curve.
 
@@ -113,10 +119,10 @@ def curve_cost(
         obstacles: what is known to stand in the world.
         points_m: (m, 3) is filled with the samples.
         chords_m: (m - 1,) is filled with the distances between them.
-        adjoint: with a gradient, is overwritten with the derivatives of objective + penalty_weight * violations.
-        with_gradient: whether one is wanted.
+        adjoint: is overwritten with the derivatives of objective + penalty_weight * violations; none are computed
+            when its arrays are empty.
     """
-    n_samples = len(points_m)
+    n_samples, with_gradient = len(points_m), len(adjoint.chord) > 0
     length = place_samples(control_m, samples, points_m, chords_m)
     clearance, height, reward = np.empty((n_samples, 4)), np.empty((n_samples, 4)), np.empty((n_samples, 4))
     clearances(points_m, obstacles, terms.look_m, clearance)

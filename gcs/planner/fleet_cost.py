@@ -14,7 +14,7 @@ from gcs.planner.coupling import (
     out_of_bounds,
     too_close,
 )
-from gcs.planner.curve_cost import Adjoint, Sampling, Terms, curve_cost, place_samples, pull_back
+from gcs.planner.curve_cost import Adjoint, Sampling, Terms, curve_cost, new_adjoint, place_samples, pull_back
 from missions.kernels import compiled
 from missions.obstacles import Obstacles
 
@@ -88,30 +88,29 @@ def swarm_cost(
     control = np.empty_like(base_m)
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
     places, side, share = np.empty((n_fractions, 3)), np.empty(n_fractions, np.int64), np.empty(n_fractions)
-    unused = Adjoint(points, points, points, chords)
+    unwanted = new_adjoint(0)
     for i in range(len(offsets)):
         control_points(base_m, axes_m, offsets[i], control)
         objective[i], violation[i] = curve_cost(
-            control, problem.samples, problem.terms, problem.obstacles, points, chords, unused, False
+            control, problem.samples, problem.terms, problem.obstacles, points, chords, unwanted
         )
         if len(context.places_m) > 1:
             step = at_fractions(points, chords, places, side, share)
             violation[i] += _towards_others(problem.coupling, vehicle, places, step, context)
 
 
-@compiled
 def set_context(problem: Problem, vehicle: int, offsets: Array, context: Context) -> None:
-    """Enter one vehicle's curve into the context."""
+    """Enter one vehicle's curve, given by (2 (n - 2),) offsets, into the context."""
     n_samples, n_fractions = len(problem.samples.first), context.places_m.shape[1]
-    control = np.empty_like(problem.base_m[0])
+    control = np.empty_like(problem.base_m[vehicle])
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
-    side, share = np.empty(n_fractions, np.int64), np.empty(n_fractions)
     control_points(problem.base_m[vehicle], problem.axes_m[vehicle], offsets, control)
     place_samples(control, problem.samples, points, chords)
-    context.steps_m[vehicle] = at_fractions(points, chords, context.places_m[vehicle], side, share)
+    places, side, share = context.places_m[vehicle], np.empty(n_fractions, np.int64), np.empty(n_fractions)
+    context.steps_m[vehicle] = at_fractions(points, chords, places, side, share)
     for other in range(len(context.places_m)):
         if other != vehicle:
-            mean = mean_distance(context.places_m[vehicle], context.places_m[other])
+            mean = mean_distance(places, context.places_m[other])
             context.means_m[vehicle, other] = context.means_m[other, vehicle] = mean
 
 
@@ -137,7 +136,7 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
         control_points(problem.base_m[i], problem.axes_m[i], offsets[i], control)
         adjoint = Adjoint(by_point[i], by_slope[i], by_bend[i], by_chord[i])
         cost, broken = curve_cost(
-            control, problem.samples, problem.terms, problem.obstacles, points[i], chords[i], adjoint, True
+            control, problem.samples, problem.terms, problem.obstacles, points[i], chords[i], adjoint
         )
         objective, violation = objective + cost, violation + broken
         steps[i] = at_fractions(points[i], chords[i], places[i], side[i], share[i])

@@ -79,7 +79,9 @@ class Progress:
     Args:
         iteration: number of swarm iterations so far.
         evaluations: of whole plans so far; one vehicle's curve counts as the fleet's share of one.
-        objective: of the best plan so far (eq. 13); while it is not feasible, its violations are added as a penalty.
+        objective: what the best plan so far costs the search: eq. 13 as it samples it, plus what slow flight near
+            obstacles costs in time, and while no plan is feasible, plus a penalty for violations. From one feasible
+            plan to the next it falls.
         feasible: whether the best plan so far keeps all limits.
         share_done: of the budget, 0 to 1.
     """

@@ -5,16 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize
 
 from gcs.planner.fleet_cost import Problem, fleet_cost
+from gcs.planner.lbfgs import Descent, minimise
 
 Array = npt.NDArray[np.float64]
-
-CORRECTIONS = 20
-"""Past steps from which L-BFGS builds its picture of the curvature."""
-LEAST_GAIN = 1e-9
-"""Relative gain per step below which a stage ends."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +62,8 @@ def refine(
         allowed = min(stage.evaluations, most - 1 - evaluations)
         if allowed <= 0 or should_stop():
             break
-        offsets, taken = _descend(stricter(problem, stage.strictness), offsets, allowed, should_stop)
-        evaluations += taken
+        descent = _descend(stricter(problem, stage.strictness), offsets, allowed, should_stop)
+        offsets, evaluations = descent.position.reshape(offsets.shape), evaluations + descent.evaluations
     objective, violation = fleet_cost(problem, offsets, gradient)
     return Refined(offsets, objective, violation, evaluations + 1)
 
@@ -78,7 +73,7 @@ def stricter(problem: Problem, factor: float) -> Problem:
     return problem._replace(terms=problem.terms._replace(penalty_weight=factor * problem.terms.penalty_weight))
 
 
-def _descend(problem: Problem, offsets: Array, most: int, should_stop: Callable[[], bool]) -> tuple[Array, int]:
+def _descend(problem: Problem, offsets: Array, most: int, should_stop: Callable[[], bool]) -> Descent:
     weight, shape = problem.terms.penalty_weight, offsets.shape
 
     def cost(flat: Array) -> tuple[float, Array]:
@@ -86,10 +81,4 @@ def _descend(problem: Problem, offsets: Array, most: int, should_stop: Callable[
         objective, violation = fleet_cost(problem, flat.reshape(shape), gradient)
         return objective + weight * violation, gradient.ravel()
 
-    def after_step(_: Array) -> None:
-        if should_stop():
-            raise StopIteration
-
-    options = {"maxfun": most, "maxiter": most, "maxcor": CORRECTIONS, "ftol": LEAST_GAIN, "gtol": 0.0}
-    result = minimize(cost, offsets.ravel(), jac=True, method="L-BFGS-B", callback=after_step, options=options)
-    return np.asarray(result.x).reshape(shape), int(result.nfev)
+    return minimise(cost, offsets.ravel(), most, should_stop)

@@ -164,7 +164,7 @@ class FleetSearch:
 
     def _report(self) -> None:
         assert self._present is not None
-        found = self._merit(self._present) if self._best is None else self._best.candidate.objective
+        found = self._merit(self._present) if self._best is None else self._best.cost
         share_done = self._budget.share_done(self.evaluations)
         progress = Progress(self._iterations, int(self.evaluations), found, self._best is not None, share_done)
         self.convergence.append(progress)
