@@ -92,6 +92,7 @@ class Simulator:
         self._first_takeoff_s: float | None = None
         self._out: list[tuple[int, Link, bytes]] = []
         self.collisions: list[Collision] = []
+        self._known_crashes = np.zeros(len(mission.vehicles), dtype=np.int64)
         views = self._fleet.views()
         self.vehicles = {
             vehicle.sysid: Vehicle(
@@ -125,7 +126,7 @@ class Simulator:
             position_enu_m=self._fleet.positions_enu_m,
             velocity_enu_m_s=self._fleet.velocities_enu_m_s,
             attitude_ned_frd=self._fleet.vehicles["attitude"].copy(),
-            crashed=self._fleet.vehicles["crash"] != 0,
+            crashed=self._fleet.vehicles["crash"] != Crash.NONE,
         )
 
     def receive(self, sysid: int, link: Link, datagram: bytes) -> None:
@@ -182,16 +183,15 @@ class Simulator:
 
     def _note_collisions(self) -> None:
         crashes = self._fleet.vehicles["crash"]
-        if np.count_nonzero(crashes) == len(self.collisions):
+        if np.array_equal(crashes, self._known_crashes):
             return
-        known = {collision.sysid for collision in self.collisions}
-        positions = self._fleet.positions_enu_m
-        for index, sysid in enumerate(self.vehicles):
-            if crashes[index] and sysid not in known:
-                east, north, up = positions[index].tolist()
-                what = Crash(int(crashes[index]))
-                other = self._name_of(what, int(self._fleet.vehicles["crash_other"][index]))
-                self.collisions.append(Collision(self.time_s, sysid, what, (east, north, up), other))
+        sysids, positions = tuple(self.vehicles), self._fleet.positions_enu_m
+        for index in np.nonzero(crashes != self._known_crashes)[0].tolist():
+            east, north, up = positions[index].tolist()
+            what = Crash(int(crashes[index]))
+            other = self._name_of(what, int(self._fleet.vehicles["crash_other"][index]))
+            self.collisions.append(Collision(self.time_s, sysids[index], what, (east, north, up), other))
+        self._known_crashes = crashes.copy()
 
     def _name_of(self, what: Crash, index: int) -> str:
         if what is Crash.MOVER:

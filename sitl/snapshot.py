@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from missions.kernels import compiled
 from sitl.dynamics.rotation import euler
+from sitl.dynamics.state import Crash
 from sitl.geodesy import reproject
 
 Array = npt.NDArray[np.float64]
@@ -75,6 +76,11 @@ class Snapshot(NamedTuple):
     @property
     def ground_speed_m_s(self) -> float:
         return math.hypot(self.vx_m_s, self.vy_m_s)
+
+
+def is_broken(s: Snapshot) -> bool:
+    """Whether a collision has cost the vehicle its rotors."""
+    return s.crash not in (Crash.NONE, Crash.GROUND)
 
 
 N_FIELDS = len(Snapshot._fields)

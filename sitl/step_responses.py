@@ -8,6 +8,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -86,10 +87,9 @@ class Pilot:
 
     def order(self, mask: int, position_m: Array, velocity_m_s: Array, yaw_rad: float = 0.0) -> None:
         """The offboard setpoint from now on."""
-        frame = mavlink.MAV_FRAME_LOCAL_NED
-        self._setpoint = mavlink.MAVLink_set_position_target_local_ned_message(
-            0, 1, 1, frame, mask, *position_m, *velocity_m_s, 0.0, 0.0, 0.0, yaw_rad, 0.0
-        )
+        motion = (*position_m.tolist(), *velocity_m_s.tolist(), 0.0, 0.0, 0.0)
+        message: Any = mavlink.MAVLink_set_position_target_local_ned_message
+        self._setpoint = message(0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, mask, *motion, yaw_rad, 0.0)
 
     def go_offboard(self) -> None:
         """Hover in Offboard, where the vehicle is, after a take-off to 20 m."""

@@ -25,7 +25,7 @@ from sitl.microservices.setpoint_server import SetpointServer
 from sitl.microservices.statustext import StatusTexts
 from sitl.microservices.streams import Streams
 from sitl.microservices.telemetry import Moment
-from sitl.snapshot import Snapshot
+from sitl.snapshot import Snapshot, is_broken
 from sitl.wire import FrameReader
 
 Handler = Callable[[Message, Sender], None]
@@ -73,7 +73,7 @@ class Vehicle:
         )
         self._now_s = 0.0
         self._snapshot = first_view
-        self._crashed = False
+        self._crash = first_view.crash
         self._readers = {link: FrameReader() for link in Link}
         self._router = Router(sysid)
         self._streams = {link: Streams(link, self.outbox, TICK_S) for link in Link}
@@ -156,9 +156,9 @@ class Vehicle:
         self._texts.listener = self._peers.gcs_listens(now_s)
         self._peers.update(now_s)
         self.autopilot.tick(snapshot, now_s, dt_s)
-        if snapshot.crash and not self._crashed:
-            self._crashed = True
-            self._texts.say(Severity.CRITICAL, "Collision: rotors lost")
+        if snapshot.crash != self._crash:
+            self._crash = snapshot.crash
+            self._texts.say(Severity.CRITICAL, "Collision: rotors lost" if is_broken(snapshot) else "Hard landing")
         self._texts.flush()
         self._parameters.tick()
         for transfer in self._transfers.values():

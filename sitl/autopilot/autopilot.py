@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from sitl.autopilot.battery import Battery
-from sitl.autopilot.commander import Commander, Situation
+from sitl.autopilot.commander import BatteryWarning, Commander, Situation
 from sitl.autopilot.craft import Craft
 from sitl.autopilot.flight_control import FlightControl
 from sitl.autopilot.geofence import Geofence
@@ -15,9 +15,14 @@ from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.places import LocalPoint, OwnFrame
 from sitl.autopilot.plan import Plan
 from sitl.autopilot.reports import Result, Say, Severity
-from sitl.snapshot import Snapshot
+from sitl.snapshot import Snapshot, is_broken
 
 FENCE_CHECK_S = 0.2
+BATTERY_TEXTS = {
+    BatteryWarning.LOW: "Low battery",
+    BatteryWarning.CRITICAL: "Critical battery",
+    BatteryWarning.EMERGENCY: "Emergency battery level",
+}
 HOME_SET_S = 0.5
 """Home is set when the estimator has settled, this long after boot."""
 
@@ -97,7 +102,7 @@ class Autopilot:
             gcs_lost=self.gcs_lost,
             battery=self.battery.warning,
             fence_breached=self._fence_breached,
-            crashed=bool(s.crash),
+            crashed=is_broken(s),
             at_rest=bool(s.grounded),
         )
 
@@ -142,7 +147,7 @@ class Autopilot:
     def tick(self, s: Snapshot, now_s: float, dt_s: float) -> None:
         """Let the autopilot look at its vehicle and decide what the control does next."""
         self._snapshot, self._now_s = s, now_s
-        self.battery.update(self.commander.armed, dt_s)
+        self._drain(dt_s)
         if now_s >= self._next_fence_s:
             self._next_fence_s = now_s + FENCE_CHECK_S
             self._check_fence(s)
@@ -161,11 +166,23 @@ class Autopilot:
         self._was_armed = commander.armed
         if not commander.armed or commander.mode is Mode.TERMINATION:
             self.navigator.stop()
-        elif self.navigator.update(commander.mode, s, now_s):
-            commander.mode_finished(commander.mode)
+        else:
+            following = self.navigator.update(commander.mode, s, now_s)
+            if following is not None:
+                commander.mode_finished(commander.mode, following)
+
+    def _drain(self, dt_s: float) -> None:
+        """Let the battery run, and say how empty it has become."""
+        before = self.battery.warning
+        self.battery.update(self.commander.armed, dt_s)
+        warning = self.battery.warning
+        if warning.value > before.value:
+            self._say(Severity.EMERGENCY, BATTERY_TEXTS[warning])
 
     def _announce_landing(self, landed: bool) -> None:
         landed = landed or not self.commander.armed
+        if self.commander.mode is Mode.TERMINATION:
+            return
         if self._was_landed and not landed:
             self._say(Severity.INFO, "Takeoff detected")
         elif landed and not self._was_landed and self.commander.armed:
@@ -182,7 +199,7 @@ class Autopilot:
         here = LocalPoint(s.x_m, s.y_m, s.z_m)
         allowed = self.fence.allows(here)
         self._fence_inside = self._fence_inside or self.fence.zones_allow(here)
-        breached = self._fence_inside and not allowed and not s.landed
-        if breached and not self._fence_breached and self.parameters["GF_ACTION"] > 0:
+        breached = self._fence_inside and not allowed and self.parameters["GF_ACTION"] > 0
+        if breached and not self._fence_breached:
             self._say(Severity.CRITICAL, "Geofence violation: approaching or outside geofence")
         self._fence_breached = breached

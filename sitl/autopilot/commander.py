@@ -84,7 +84,9 @@ class Commander:
     @property
     def ready(self) -> bool:
         """Whether the selected mode may be armed."""
-        return self._booted and not self._situation.crashed and self._may_run(self.intended, arming=True)
+        s = self._situation
+        intact = self._terminated_s is None and not s.crashed
+        return self._booted and intact and not s.fence_breached and self._may_run(self.intended, arming=True)
 
     @property
     def system_status(self) -> SystemStatus:
@@ -108,7 +110,7 @@ class Commander:
         if self.armed:
             return Result.ACCEPTED
         lost_gcs = self._parameters["NAV_DLL_ACT"] > 0 and self._situation.gcs_lost
-        if not forced and (not self.ready or lost_gcs):
+        if self._terminated_s is not None or (not forced and (not self.ready or lost_gcs)):
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
             return Result.TEMPORARILY_REJECTED
         self.armed, self.armed_s = True, self._now_s
@@ -156,20 +158,22 @@ class Commander:
         self._terminated_s = self._now_s
         return Result.ACCEPTED
 
-    def mode_finished(self, mode: Mode) -> None:
-        """The navigator has come to the end of a mode that turns into Hold."""
+    def mode_finished(self, mode: Mode, following: Mode) -> None:
+        """The navigator has come to the end of a mode, which turns into another."""
         if self.intended is mode:
-            self._intend(Mode.HOLD)
+            self._intend(following)
 
     # ------------------------------------------------------------------- tick
     def update(self) -> None:
         """Let time pass: failsafes, automatic disarming."""
         if not self.armed:
             return
+        if self._terminated_s is not None:
+            if self._now_s - self._terminated_s >= LOCKDOWN_S:
+                self.disarm("lockdown", forced=True)
+            return
         self._update_failsafes()
-        if self._terminated_s is not None and self._now_s - self._terminated_s >= LOCKDOWN_S:
-            self.disarm("lockdown", forced=True)
-        elif self._situation.crashed and self._situation.at_rest:
+        if self._situation.crashed and self._situation.at_rest:
             self.disarm("failure detector", forced=True)
         elif self._situation.landed:
             self._disarm_when_landed()
@@ -181,9 +185,10 @@ class Commander:
         failing = {
             Cause.OFFBOARD_LOST: self.intended is Mode.OFFBOARD and not s.offboard_alive,
             Cause.GCS_LOST: s.gcs_lost and self.intended is not Mode.LAND and self._parameters["NAV_DLL_ACT"] > 0,
+            Cause.BATTERY_LOW: s.battery is BatteryWarning.LOW,
             Cause.BATTERY_CRITICAL: s.battery is BatteryWarning.CRITICAL,
             Cause.BATTERY_EMERGENCY: s.battery is BatteryWarning.EMERGENCY,
-            Cause.GEOFENCE: s.fence_breached,
+            Cause.GEOFENCE: s.fence_breached and not s.landed,
         }
         worse = self._failsafes.update(failing, self._now_s)
         if worse and self._failsafes.delayed > Action.NONE:
@@ -193,7 +198,7 @@ class Commander:
             self._say(Severity.CRITICAL, "Failsafe activated")
         if self._failsafes.action is Action.DISARM:
             self.disarm("failsafe", forced=True)
-        elif self._failsafes.action is Action.TERMINATE and self._terminated_s is None:
+        elif self._failsafes.action is Action.TERMINATE:
             self._terminated_s = self._now_s
 
     def _disarm_when_landed(self) -> None:

@@ -17,9 +17,10 @@ class Cause(IntEnum):
 
     OFFBOARD_LOST = 0
     GCS_LOST = 1
-    BATTERY_CRITICAL = 2
-    BATTERY_EMERGENCY = 3
-    GEOFENCE = 4
+    BATTERY_LOW = 2
+    BATTERY_CRITICAL = 3
+    BATTERY_EMERGENCY = 4
+    GEOFENCE = 5
 
 
 class Action(IntEnum):
@@ -156,6 +157,8 @@ class Failsafes:
     def _battery_action(self, cause: Cause) -> Action:
         """COM_LOW_BAT_ACT: 0 warning, 2 land, 3 return when critical and land when it is an emergency."""
         setting = int(self._parameters["COM_LOW_BAT_ACT"])
+        if cause is Cause.BATTERY_LOW:
+            return Action.WARN
         if setting == 2 or (setting == 3 and cause is Cause.BATTERY_EMERGENCY):
             return Action.LAND
         return Action.RTL if setting == 3 else Action.WARN

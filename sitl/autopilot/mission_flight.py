@@ -6,6 +6,7 @@ item 0, without a stop.
 
 import math
 from collections.abc import Callable
+from enum import Enum, auto
 
 from missions.mission_items import MissionItem
 from sitl.autopilot.craft import Craft, distance_m, is_there
@@ -29,6 +30,16 @@ from sitl.snapshot import Snapshot
 NAN = math.nan
 
 
+class Outcome(Enum):
+    """What becomes of a mission in one tick."""
+
+    GOING_ON = auto()
+    FINISHED = auto()
+    """Come to its end in the air."""
+    RETURN = auto()
+    """Its item is RETURN_TO_LAUNCH, a mode of its own."""
+
+
 class MissionFlight:
     """Progress through one mission.
 
@@ -49,16 +60,10 @@ class MissionFlight:
         self._climbing_to: LocalPoint | None = None
         self._target: LocalPoint | None = None
         self._landing = False
-        self._returning = False
         self._arrived_s: float | None = None
         self._finished = False
 
     # ------------------------------------------------------------------- plan
-    @property
-    def wants_return(self) -> bool:
-        """The current item is RETURN_TO_LAUNCH."""
-        return self._returning
-
     @property
     def target(self) -> LocalPoint | None:
         """What was flown to last."""
@@ -80,7 +85,7 @@ class MissionFlight:
 
     # ------------------------------------------------------------------- mode
     def start(self, s: Snapshot, now_s: float) -> None:
-        self._active, self._returning = True, False
+        self._active = True
         if self._finished and s.landed:
             self._go_to(0)
         self._craft.say(Severity.INFO, "Executing Mission")
@@ -94,19 +99,24 @@ class MissionFlight:
         self._active = False
         self._climbing_to = None
 
-    def update(self, s: Snapshot, now_s: float) -> bool:
-        """Fly on; returns whether the mission has come to its end in the air."""
+    def update(self, s: Snapshot, now_s: float) -> Outcome:
+        """Fly on."""
+        if not self.plan.items:
+            self._craft.say(Severity.CRITICAL, "No valid mission available, loitering")
+            return Outcome.FINISHED
         if self._climbing_to is not None:
             if s.landed or not is_there(self._craft, s, self._climbing_to, math.inf):
-                return False
+                return Outcome.GOING_ON
             self._climbing_to = None
-        if self._finished or not self.plan.items:
-            return not self._landing
+        if self._finished:
+            return Outcome.GOING_ON if self._landing else Outcome.FINISHED
+        if self.plan.items[self.current].command == Cmd.NAV_RETURN_TO_LAUNCH:
+            return Outcome.RETURN
         if not self._begun:
             self._begin(s)
         if self._is_done(s, now_s):
             self._complete()
-        return False
+        return Outcome.GOING_ON
 
     def land_detected(self) -> None:
         """The vehicle has landed: the end of a LAND item."""
@@ -118,7 +128,7 @@ class MissionFlight:
     # ---------------------------------------------------------------- details
     def _go_to(self, seq: int) -> None:
         self.current = seq
-        self._begun = self._finished = self._landing = self._returning = False
+        self._begun = self._finished = self._landing = False
         self._climbing_to = self._arrived_s = None
 
     def _climb(self, item: MissionItem, s: Snapshot) -> None:
@@ -140,17 +150,14 @@ class MissionFlight:
     def _begin(self, s: Snapshot) -> None:
         """Order the current item."""
         item = self.plan.items[self.current]
-        self._begun, self._arrived_s = True, None
-        self._landing = self._returning = False
+        self._begun, self._arrived_s, self._landing = True, None, False
         craft = self._craft
         match item.command:
             case Cmd.NAV_LAND:
                 self._fly(item, s, keep_height=True)
-            case Cmd.NAV_RETURN_TO_LAUNCH:
-                self._returning = True
-            case Cmd.NAV_TAKEOFF | Cmd.NAV_WAYPOINT | Cmd.NAV_LOITER_UNLIM | Cmd.NAV_LOITER_TIME:
-                self._fly(item, s)
-            case Cmd.NAV_LOITER_TO_ALT:
+            case (
+                Cmd.NAV_TAKEOFF | Cmd.NAV_WAYPOINT | Cmd.NAV_LOITER_UNLIM | Cmd.NAV_LOITER_TIME | Cmd.NAV_LOITER_TO_ALT
+            ):
                 self._fly(item, s)
             case Cmd.DO_CHANGE_SPEED:
                 craft.change_speed(item.param2)
@@ -177,8 +184,6 @@ class MissionFlight:
         item = self.plan.items[self.current]
         if item.command == Cmd.NAV_LAND:
             self._land_when_there(item, s)
-            return False
-        if item.command == Cmd.NAV_RETURN_TO_LAUNCH:
             return False
         if item.command in PLACES or item.command == Cmd.NAV_TAKEOFF:
             assert self._target is not None  # _begin() has set it

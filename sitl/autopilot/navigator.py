@@ -6,7 +6,7 @@ from collections.abc import Callable
 from sitl.autopilot.craft import Craft
 from sitl.autopilot.flight_modes import Descend, FlightMode, Hold, Land, Return, Takeoff
 from sitl.autopilot.geofence import Geofence
-from sitl.autopilot.mission_flight import MissionFlight
+from sitl.autopilot.mission_flight import MissionFlight, Outcome
 from sitl.autopilot.modes import Mode
 from sitl.autopilot.offboard import Offboard
 from sitl.autopilot.places import LocalPoint
@@ -24,17 +24,15 @@ class Navigator:
         self._fence = fence
         self._takeoff = Takeoff(craft)
         self._hold = Hold(craft)
-        self._return = Return(craft)
         self.mission = MissionFlight(craft, on_reached)
         self._modes: dict[Mode, FlightMode] = {
             Mode.TAKEOFF: self._takeoff,
             Mode.HOLD: self._hold,
             Mode.LAND: Land(craft),
-            Mode.RTL: self._return,
+            Mode.RTL: Return(craft),
             Mode.POSITION: Descend(craft),
         }
         self._flown: Mode | None = None
-        self._returning = False
 
     # ----------------------------------------------------------------- orders
     def order_takeoff(self, altitude_amsl_m: float, yaw_rad: float) -> None:
@@ -42,7 +40,9 @@ class Navigator:
         self._takeoff.order(altitude_amsl_m, yaw_rad)
 
     def reposition(self, target: LocalPoint, yaw_rad: float, s: Snapshot, now_s: float) -> None:
-        """DO_REPOSITION: for Hold, now or very soon; a NaN coordinate keeps what there is."""
+        """DO_REPOSITION: for Hold, now or very soon; a NaN coordinate keeps what there is, all NaN is a pause."""
+        if all(math.isnan(coordinate) for coordinate in target):
+            target = self._craft.stop_point(s)
         finite = LocalPoint(*(c if math.isfinite(c) else here for c, here in zip(target, s, strict=False)))
         if self._fence.allows(finite):
             self._hold.order(target, yaw_rad, now_s)
@@ -70,46 +70,42 @@ class Navigator:
         self._leave()
         self._craft.control.motors_off()
 
-    def update(self, mode: Mode, s: Snapshot, now_s: float) -> bool:
-        """Fly a mode for one tick; returns whether it has come to its end."""
+    def update(self, mode: Mode, s: Snapshot, now_s: float) -> Mode | None:
+        """Fly a mode for one tick; returns the mode that follows when it has come to its end."""
         entering = mode is not self._flown
         if entering:
             self._leave()
             self._flown = mode
         if mode is Mode.OFFBOARD:
             self._offboard.apply(self._craft.control, entering=entering)
-            return False
+            return None
         if mode is Mode.MISSION:
             return self._fly_mission(s, now_s, entering)
         flight_mode = self._modes.get(mode)
         if flight_mode is None:  # a mode with sticks, which can only be chosen on the ground
             self._craft.control.idle()
-            return False
+            return None
         if entering:
             flight_mode.start(s, now_s)
-        finished = flight_mode.update(s, now_s)
-        if finished and mode is Mode.TAKEOFF:
-            self._hold_at(self._takeoff.target, now_s)
-        return finished
+        if not flight_mode.update(s, now_s):
+            return None
+        self._hold_at(self._takeoff.target, now_s)  # no other mode comes to an end
+        return Mode.HOLD
 
     def land_detected(self) -> None:
         self.mission.land_detected()
 
-    def _fly_mission(self, s: Snapshot, now_s: float, entering: bool) -> bool:
+    def _fly_mission(self, s: Snapshot, now_s: float, entering: bool) -> Mode | None:
         if entering:
-            self._returning = False
             self.mission.start(s, now_s)
-        if self.mission.wants_return:
-            if not self._returning:
-                self._returning = True
-                self._return.start(s, now_s)
-            self._return.update(s, now_s)
-            return False
-        self._returning = False
-        finished = self.mission.update(s, now_s)
-        if finished:
+        outcome = self.mission.update(s, now_s)
+        if outcome is Outcome.RETURN:
+            self._craft.say(Severity.INFO, "Returning to launch")
+            return Mode.RTL
+        if outcome is Outcome.FINISHED:
             self._hold_at(self.mission.target, now_s)
-        return finished
+            return Mode.HOLD
+        return None
 
     def _hold_at(self, target: LocalPoint | None, now_s: float) -> None:
         """Hold, which follows, shall stay where the mode before has come to."""

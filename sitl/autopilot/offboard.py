@@ -173,11 +173,11 @@ class Offboard:
             control.hold_attitude(s.quaternion, s.thrust, s.rates_rad_s[2])
 
     def _take(self, name: str, target: PositionTarget, setpoint: TrajectorySetpoint, now_s: float) -> None:
-        if Ignore.FORCE in target.ignore:
-            return self._refuse(f"{name} force not supported")
         numbers = (*setpoint.position_m, *setpoint.velocity_m_s, *setpoint.acceleration_m_s2)
         if all(math.isnan(number) for number in numbers):
             return self._refuse(f"{name} invalid")
+        if Ignore.FORCE in target.ignore:
+            return self._refuse(f"{name} force not supported")
         return self._accept(setpoint, now_s)
 
     def _accept(self, setpoint: TrajectorySetpoint | AttitudeSetpoint, now_s: float) -> None:

@@ -76,16 +76,17 @@ def mix(v: Any, roll: float, pitch: float, yaw: float, thrust: float) -> None:
     motor[1] = thrust + across - along
     motor[2] = thrust + across + along
     motor[3] = thrust - across - along
-    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, -1.0, 0.0)
-    _desaturate(motor, -HALF_SQRT2, HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2, -1.0, 1.0)
-    _desaturate(motor, HALF_SQRT2, -HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2, -1.0, 1.0)
+    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, True)
+    _desaturate(motor, -HALF_SQRT2, HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2)
+    _desaturate(motor, HALF_SQRT2, -HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2)
     before = HALF_SQRT2 * 0.5 * (-motor[0] + motor[1] + motor[2] - motor[3])
     before_pitch = HALF_SQRT2 * 0.5 * (motor[0] - motor[1] + motor[2] - motor[3])
     motor[0] += yaw
     motor[1] += yaw
     motor[2] -= yaw
     motor[3] -= yaw
-    _desaturate_yaw(motor)
+    _desaturate(motor, 1.0, 1.0, -1.0, -1.0, False, 1.0 + YAW_THRUST_MARGIN)
+    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, True)
     given_yaw = 0.25 * (motor[0] + motor[1] - motor[2] - motor[3])
     v.saturated[0] = _sign(roll - before)
     v.saturated[1] = _sign(pitch - before_pitch)
@@ -134,38 +135,29 @@ def _rate_pid(v: Any, k: int, p: float, i: float, d: float, limit: float, dt_s: 
 
 
 @compiled
-def _desaturate(motor: Any, d0: float, d1: float, d2: float, d3: float, least: float, most: float) -> None:
-    """Move the motors along a direction until none is outside [0, 1], or the excess is the same on both sides.
+def _desaturate(
+    motor: Any, d0: float, d1: float, d2: float, d3: float, only_down: bool = False, top: float = 1.0
+) -> None:
+    """Move the motors along a direction until none is outside [0, top], or the excess is the same on both sides.
 
     Args:
         motor: (4,) thrusts, changed in place.
         d0, d1, d2, d3: the direction.
-        least: -1 to allow moves against the direction, 0 not to.
-        most: 1 to allow moves along the direction, 0 not to.
+        only_down: do not move along the direction, only against it.
+        top: the highest thrust of a motor.
     """
     direction = (d0, d1, d2, d3)
     for share in (1.0, 0.5):
         lowest, highest = 0.0, 0.0
         for k in range(4):
-            excess = -motor[k] if motor[k] < 0.0 else min(1.0 - motor[k], 0.0)
+            excess = -motor[k] if motor[k] < 0.0 else min(top - motor[k], 0.0)
             move = excess / direction[k]
             lowest, highest = min(lowest, move), max(highest, move)
         move = share * (lowest + highest)
-        move = min(max(move, least * abs(move)), most * abs(move))
+        if only_down and move > 0.0:
+            return
         for k in range(4):
             motor[k] += move * direction[k]
-
-
-@compiled
-def _desaturate_yaw(motor: Any) -> None:
-    """Less yaw where rotors are saturated, but up to a margin of thrust is given up first."""
-    highest = max(max(motor[0], motor[1]), max(motor[2], motor[3]))
-    if highest > 1.0:
-        drop = min(highest - 1.0, YAW_THRUST_MARGIN)
-        for k in range(4):
-            motor[k] -= drop
-    _desaturate(motor, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0)
-    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, -1.0, 0.0)
 
 
 @compiled

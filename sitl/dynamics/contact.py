@@ -15,19 +15,20 @@ from sitl.dynamics.state import Crash
 Array = npt.NDArray[np.float64]
 
 SAFE_DESCENT_M_S = 4.0
-"""Faster than this onto the ground breaks the vehicle; landings come down at 0.3 to 2 m/s."""
+"""Faster than this onto the ground is a collision; landings come down at 0.3 to 2 m/s."""
 SAFE_SLIDE_M_S = 3.0
-"""Faster than this across the ground breaks it as well: it tips over."""
+"""Faster than this across the ground breaks the vehicle: it tips over, or has hit a slope."""
 RESTING_M = 0.05
 """A fallen vehicle comes to rest on an obstacle that is this near to its centre."""
 
-_OBSTACLE, _MOVER, _VEHICLE, _GROUND = (int(Crash[name]) for name in ("OBSTACLE", "MOVER", "VEHICLE", "GROUND"))
+_OBSTACLE, _MOVER, _VEHICLE = int(Crash.OBSTACLE), int(Crash.MOVER), int(Crash.VEHICLE)
+_TERRAIN, _GROUND, _NONE = int(Crash.TERRAIN), int(Crash.GROUND), int(Crash.NONE)
 
 
 @compiled
 def crash(v: Any, kind: int, other: int) -> None:
-    """Record a vehicle's first collision; it has lost its way and its rotors and falls from there."""
-    if v.crash == 0:
+    """Record a vehicle's collision; but for a fall onto the ground it loses its way and its rotors, and falls."""
+    if v.crash == _NONE or v.crash == _GROUND:
         v.crash = kind
         v.crash_other = other
         v.velocity_m_s[0] = v.velocity_m_s[1] = 0.0
@@ -43,7 +44,9 @@ def touch_ground(v: Any, terrain: Obstacles, lift_g: float) -> None:
         return
     if v.grounded == 0:
         across_m_s = math.hypot(v.velocity_m_s[0], v.velocity_m_s[1])
-        if v.velocity_m_s[2] > SAFE_DESCENT_M_S or across_m_s > SAFE_SLIDE_M_S:
+        if across_m_s > SAFE_SLIDE_M_S:
+            crash(v, _TERRAIN, 0)
+        elif v.velocity_m_s[2] > SAFE_DESCENT_M_S:
             crash(v, _GROUND, 0)
     v.grounded = 1
     v.position_m[2] = ground_z_m
@@ -64,7 +67,7 @@ def touch_obstacles(v: Any, obstacles: Obstacles, movers: Array, radius_m: float
     if gap_m < radius_m:
         if v.grounded == 0:
             crash(v, _OBSTACLE, 0)
-        if v.crash != 0 and gap_m < RESTING_M:
+        if v.crash != _NONE and gap_m < RESTING_M:
             v.grounded = 1
             _stand(v)
     for k in range(len(movers)):

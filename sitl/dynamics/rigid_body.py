@@ -12,6 +12,9 @@ from typing import Any
 from missions.kernels import compiled
 from sitl.dynamics.airframe import GRAVITY_M_S2
 from sitl.dynamics.rotation import body_z, from_rotation_vector, product, to_body, unit
+from sitl.dynamics.state import Crash
+
+_NONE, _GROUND = int(Crash.NONE), int(Crash.GROUND)
 
 RATE_LIMIT_RAD_S = 18.85
 """No body turns faster than three turns a second: a bound for the integration, as in PX4's simulator."""
@@ -19,10 +22,11 @@ RATE_LIMIT_RAD_S = 18.85
 
 @compiled
 def spin_rotors(v: Any, a: Any, dt_s: float) -> None:
-    """MR-1: the rotors follow their signals; a crashed vehicle's do not turn."""
+    """MR-1: the rotors follow their signals; those of a broken vehicle do not turn."""
     share = dt_s / (a.rotor_lag_s + dt_s)
+    whole = v.crash == _NONE or v.crash == _GROUND
     for k in range(4):
-        signal = 0.0 if v.crash != 0 else v.motor[k]
+        signal = v.motor[k] if whole else 0.0
         v.rotor[k] += share * (signal - v.rotor[k])
 
 

@@ -46,7 +46,10 @@ class Crash(IntEnum):
     OBSTACLE = 1
     MOVER = 2
     VEHICLE = 3
-    GROUND = 4
+    TERRAIN = 4
+    """Flown into the ground."""
+    GROUND = 5
+    """Fallen onto it: that hurts, and is recorded, but what is still whole flies again."""
 
 
 VEHICLE = np.dtype(

@@ -174,10 +174,14 @@ def _return(server: CommandServer, command: Command, sender: Sender) -> Result:
 
 
 def _start_mission(server: CommandServer, command: Command, sender: Sender) -> Result:
-    first = _number(command.params[0])
-    result = server.autopilot.refresh().start_mission()
-    if result is Result.ACCEPTED and first > 0:
-        server.autopilot.navigator.mission.set_current(first)
+    """From its first item on, whichever that is; from the current one for -1."""
+    mission, first = server.autopilot.navigator.mission, command.params[0]
+    commander = server.autopilot.refresh()
+    if server.autopilot.mission_ready and not -1 <= first < len(mission.plan.items):
+        return Result.DENIED
+    result = commander.start_mission()
+    if result is Result.ACCEPTED and first >= 0:
+        mission.set_current(int(first))
     return result
 
 
@@ -187,7 +191,9 @@ def _terminate(server: CommandServer, command: Command, sender: Sender) -> Resul
 
 # -------------------------------------------------------------------- flight
 def _reposition(server: CommandServer, command: Command, sender: Sender) -> Result:
-    """The altitude is AMSL whatever the frame."""
+    """Only with the bit that switches to Hold; the altitude is AMSL whatever the frame."""
+    if _number(command.params[1]) != 1:
+        return Result.UNSUPPORTED
     autopilot = server.autopilot
     frame, (latitude_deg, longitude_deg) = autopilot.craft.frame, command.place
     z_m = frame.origin.altitude_m - command.params[6]
@@ -196,10 +202,9 @@ def _reposition(server: CommandServer, command: Command, sender: Sender) -> Resu
         target = frame.local(latitude_deg, longitude_deg, command.params[6])
     elif not (math.isnan(latitude_deg) and math.isnan(longitude_deg)):
         return Result.DENIED
-    if _number(command.params[1]) & 1:
-        result = autopilot.request_mode(Mode.HOLD)
-        if result is not Result.ACCEPTED:
-            return result
+    result = autopilot.request_mode(Mode.HOLD)
+    if result is not Result.ACCEPTED:
+        return result
     if command.params[0] > 0.0:
         autopilot.craft.change_speed(command.params[0])
     yaw_rad = command.params[3]
@@ -230,7 +235,10 @@ def _check(server: CommandServer, command: Command, sender: Sender) -> Result:
 
 
 def _reboot(server: CommandServer, command: Command, sender: Sender) -> Result:
-    return Result.DENIED if server.autopilot.armed else Result.UNSUPPORTED
+    """There is nothing to reboot; 0 asks for nothing."""
+    if server.autopilot.armed:
+        return Result.DENIED
+    return Result.ACCEPTED if command.params[0] == 0.0 else Result.UNSUPPORTED
 
 
 def _silence(server: CommandServer, command: Command, sender: Sender) -> None:

@@ -18,11 +18,14 @@ from sitl.dialect import Message, mavlink
 from sitl.microservices.outbox import Sender
 
 FRAME_GLOBAL_INT, FRAME_RELATIVE_INT, FRAME_MISSION = 5, 6, 2
-GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6})
 HIGHEST_M = 100_000.0
 
-_COMMANDS = {0: MISSION_COMMANDS, 1: FENCES, 2: frozenset({Cmd.RALLY_POINT})}
-"""MAV_MISSION_TYPE -> commands that its plans may hold."""
+_AT_A_PLACE = PLACES | TAKEOFF_AND_LANDING | {Cmd.DO_SET_ROI, Cmd.DO_SET_ROI_LOCATION}
+_PLACED_COMMANDS = {0: _AT_A_PLACE, 1: FENCES | PLACES, 2: frozenset({Cmd.RALLY_POINT})}
+"""MAV_MISSION_TYPE -> commands that its plans may hold in a global frame."""
+_OTHER_COMMANDS = {0: (MISSION_COMMANDS - _AT_A_PLACE) | {Cmd.DO_SET_ROI}, 1: frozenset(), 2: frozenset()}
+"""The same in MAV_FRAME_MISSION."""
 
 
 class ItemRefused(Exception):
@@ -100,10 +103,11 @@ def float_item(item: MissionItem, seq: int, receiver: Sender, kind: int) -> Mess
 
 def _checked(message: Message, x: int, y: int, kind: int) -> MissionItem:
     command = message.command
-    if command not in _COMMANDS[kind] and not (kind == 1 and command in PLACES):
-        raise ItemRefused(mavlink.MAV_MISSION_UNSUPPORTED)
     if message.frame not in GLOBAL_FRAMES and message.frame != FRAME_MISSION:
         raise ItemRefused(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+    known = _OTHER_COMMANDS if message.frame == FRAME_MISSION else _PLACED_COMMANDS
+    if command not in known[kind]:
+        raise ItemRefused(mavlink.MAV_MISSION_UNSUPPORTED)
     _refuse_bad_parameters(message)
     if command in PLACES or command in TAKEOFF_AND_LANDING or kind != 0:
         _refuse_bad_place(message, x, y, optional=command in TAKEOFF_AND_LANDING)

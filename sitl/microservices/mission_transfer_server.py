@@ -173,6 +173,7 @@ class MissionTransferServer:
         try:
             upload.items.append(read(message, upload.kind))
         except ItemRefused as refused:
+            self._say(Severity.CRITICAL, "IGN MISSION_ITEM: Invalid item")
             self._fail(upload, refused.result)
             return
         if len(upload.items) < upload.count:

@@ -21,9 +21,8 @@ class StatusTexts:
         """Whether a ground station listens; set to False when its heartbeats stop."""
 
     def say(self, severity: Severity, text: str) -> None:
-        """Send a text, now or when somebody listens again. PX4 ends its texts in a tab; they come as events as well."""
+        """Keep a text for the next flush. PX4 ends texts that come as events as well in a tab; so do we."""
         self._waiting.append((severity, f"{text}\t"))
-        self.flush()
 
     def flush(self) -> None:
         """Send what has been kept, if there is a listener."""
