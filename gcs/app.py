@@ -1,8 +1,9 @@
 """The composition root: builds the parts of one session, runs them together, and takes them down again."""
 
 import asyncio
+import contextlib
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from pathlib import Path
 
@@ -29,8 +30,11 @@ TRAIL_INTERVAL_S = 0.05
 HOLD_TIMEOUT_S = 5.0
 TRUTH_FILE = "truth.csv"
 
-Page = Callable[[Desk], Awaitable[None]]
-"""Serves the web page of a desk until it is cancelled."""
+BROWSER_TIMEOUT_S = 15.0
+"""A flight with a page waits for a browser, but not longer than this [s]."""
+
+Page = Callable[[Desk, asyncio.Event], Coroutine[None, None, None]]
+"""Serves the web page of a desk until it is cancelled; sets the event when the first browser shows it."""
 
 
 class FlightApp:
@@ -69,6 +73,7 @@ class FlightApp:
         simulated = settings.autopilots is Autopilots.SIMULATED
         self.desk = Desk(station, events, flight, Trails(mission.frame), simulated=simulated)
         self.report: FlightReport | None = None
+        self._first_browser = asyncio.Event()
         self._started_s = time.monotonic()
 
     async def run(self) -> FlightReport:
@@ -104,7 +109,7 @@ class FlightApp:
                     group.create_task(self._sample_trails(), name="trails"),
                 ]
                 if self._page is not None:
-                    background.append(group.create_task(_until_cancelled(self._page(self.desk)), name="page"))
+                    background.append(group.create_task(self._page(self.desk, self._first_browser), name="page"))
                 if self.settings.autopilots is Autopilots.SIMULATED:
                     child = await self._start_simulator(simulator)
                     background.append(group.create_task(simulator.watch(child), name="watch the simulator"))
@@ -119,6 +124,8 @@ class FlightApp:
     async def _fly(self) -> None:
         """The flight, and with a page what the operator does before and after it."""
         try:
+            if self._page is not None:
+                await self._wait_for_browser()
             await self.desk.fly()
             self.report = self._write_report("")
             if self._page is not None:
@@ -135,6 +142,13 @@ class FlightApp:
             raise
         finally:
             await self.desk.close()
+
+    async def _wait_for_browser(self) -> None:
+        self.events.add("page", f"page: http://{self.settings.host}:{self.settings.port}")
+        self.events.add("page", f"the flight begins when a browser shows it, or in {BROWSER_TIMEOUT_S:g} s")
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(BROWSER_TIMEOUT_S):
+                await self._first_browser.wait()
 
     async def _leave_holding(self, why: str) -> None:
         if not self.flight.in_flight:
@@ -204,6 +218,7 @@ class FlightApp:
             offsets_m = {sysid: part.monitor.ground_offset_m for sysid, part in self.flight.vehicles.items()}
             assert self.desk.trails is not None
             self.desk.trails.sample(self.station.fleet, offsets_m)
+            self.desk.collect_texts()
             await asyncio.sleep(TRAIL_INTERVAL_S / self.settings.speed)
 
     def _write_report(self, reason: str) -> FlightReport:
@@ -224,10 +239,6 @@ class FlightApp:
             return read_truth(truth)
         assert self.desk.trails is not None
         return {sysid: flown_from_trail(trail) for sysid, trail in self.desk.trails.by_sysid.items()}
-
-
-async def _until_cancelled(page: Awaitable[None]) -> None:
-    await page
 
 
 def _first(group: BaseExceptionGroup) -> BaseException:

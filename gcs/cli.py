@@ -6,9 +6,9 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
@@ -21,6 +21,12 @@ from missions.faults import EXAMPLES as FAULT_EXAMPLES
 from missions.faults import parse_fault
 from missions.frames import GeodeticPoint
 from missions.mission import Mission, load_mission, shipped_missions
+
+if TYPE_CHECKING:
+    from gcs.desk import Desk
+    from gcs.flight.events import EventLog
+    from gcs.flight.report import FlightReport
+    from gcs.planner_process import PlannerProcess
 
 BAD_INPUT = 2
 
@@ -173,7 +179,7 @@ def watch(
     console = FlightConsole()
     events = EventLog(time.monotonic, listeners=[console.show])
     console.say(f"page: http://127.0.0.1:{port}")
-    asyncio.run(run_watch(links, events, lambda desk: serve_page(desk, "127.0.0.1", port)))
+    asyncio.run(run_watch(links, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
 
 
 @app.command()
@@ -215,7 +221,6 @@ def main() -> None:
 
 
 def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
-    from gcs.app import FlightApp
     from gcs.console import FlightConsole, PlanConsole
     from gcs.flight.events import EventLog
     from gcs.planner_process import PlannerProcess
@@ -225,15 +230,28 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     console = FlightConsole()
     with _work_dir(settings.report_dir) as work_dir, PlanConsole(console.console) as progress:
         events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
-        with PlannerProcess("ecpso", settings.seed, progress.show) as planner:
-            flight = FlightApp(settings, mission, planner.plan, events, work_dir)
-            report = asyncio.run(flight.run())
+        with PlannerProcess("ecpso", settings.seed, [progress.show]) as planner:
+            report = asyncio.run(_fly(settings, mission, planner, events, work_dir))
         events.close()
     verdict = "success" if report.success else "FAILED"
     console.say(f"{verdict}: {report.reason}", style="green" if report.success else "bold red")
     if settings.report_dir is not None:
         console.say(f"report: {settings.report_dir / 'report.json'}")
     return 0 if report.success else 1
+
+
+async def _fly(
+    settings: chosen.FlightSettings, mission: Mission, planner: "PlannerProcess", events: "EventLog", work_dir: Path
+) -> "FlightReport":
+    from gcs.app import FlightApp
+    from gcs.view.server import serve_page
+
+    def page(desk: "Desk", first_browser: asyncio.Event) -> Coroutine[None, None, None]:
+        return serve_page(desk, settings.host, settings.port, first_browser)
+
+    app = FlightApp(settings, mission, planner.plan, events, work_dir, None if settings.headless else page)
+    planner.on_progress.append(app.desk.on_plan_progress)
+    return await app.run()
 
 
 @contextlib.contextmanager

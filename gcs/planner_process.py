@@ -5,7 +5,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import Connection
 
@@ -25,11 +25,11 @@ class PlannerProcess:
     Args:
         algorithm: the planner's name.
         seed: of its random numbers.
-        on_progress: called on the event loop while it plans.
+        on_progress: called on the event loop while it plans; more may be added.
     """
 
-    def __init__(self, algorithm: str, seed: int, on_progress: ProgressListener | None = None) -> None:
-        self._algorithm, self._seed, self._on_progress = algorithm, seed, on_progress
+    def __init__(self, algorithm: str, seed: int, on_progress: Iterable[ProgressListener] = ()) -> None:
+        self._algorithm, self._seed, self.on_progress = algorithm, seed, list(on_progress)
         context = multiprocessing.get_context("spawn")
         self._receiver, self._sender = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(self._sender,))
@@ -50,8 +50,8 @@ class PlannerProcess:
     def _drain(self) -> None:
         while self._receiver.poll():
             progress = self._receiver.recv()
-            if self._on_progress is not None:
-                self._on_progress(progress)
+            for listener in self.on_progress:
+                listener(progress)
 
     def __enter__(self) -> "PlannerProcess":
         return self

@@ -30,7 +30,7 @@ async def watch(links: tuple[LinkUrl, ...], events: EventLog, page: Page) -> Non
         async with asyncio.TaskGroup() as group:
             group.create_task(station.send_heartbeats(), name="heartbeats")
             group.create_task(_sample_trails(desk), name="trails")
-            await page(desk)
+            await page(desk, asyncio.Event())
 
 
 async def _sample_trails(desk: Desk) -> None:
@@ -41,4 +41,5 @@ async def _sample_trails(desk: Desk) -> None:
             desk.trails = Trails(LocalFrame(home)) if home is not None else None
         else:
             desk.trails.sample(desk.station.fleet, {})
+        desk.collect_texts()
         await asyncio.sleep(TRAIL_INTERVAL_S)
