@@ -19,10 +19,12 @@ class Reserve:
 
     nominal_share: float = 0.92
     """Speed that is aimed at, as a share of the limit."""
-    limit_share: float = 0.96
+    limit_share: float = 0.95
     """No plan is faster than this share of the limit."""
     distance_share: float = 0.15
-    """Required clearance and avoidance distance are planned larger by this share."""
+    """Required clearance and avoidance distance are planned larger by this share ..."""
+    gnss_margin_m: float = 1.0
+    """... and outdoors by this at least: about three standard deviations of a good position fix."""
     braking_share: float = 0.85
     """Acceleration along the path that speeds are laid out with, as a share of the limit."""
     jerk_per_acceleration_hz: float = 4.0
@@ -65,6 +67,10 @@ class PilotSettings:
     """A plan begins this much in the future: search and thread switches fit in (wall clock)."""
     lateness_wall_s: float = 0.06
     """A plan that arrives later than it begins is still taken up to this (wall clock)."""
+    setpoint_lead_s: float = 0.03
+    """Setpoints are sent so much ahead of time: for their way, and because each is used until the next one."""
+    response_lead_s: float = 0.12
+    """Velocity and acceleration are sent so much earlier still: a multirotor has to tilt before it accelerates."""
     standing_m_s: float = 0.7
     """Slower than this a vehicle stands: GNSS-grade estimates wander at 0.3 m/s."""
     standing_timeout_s: float = 8.0

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from companion.settings import Reserve
 from missions.kernels import compiled
-from missions.mission import Mission
+from missions.mission import Mission, Site
 from missions.obstacles import Obstacles, clearance_at, terrain_height_at
 
 Array = npt.NDArray[np.float64]
@@ -59,20 +59,24 @@ EAST, NORTH, UP, END_CLEARANCE, END_HEIGHT, END_OUTSIDE = range(6)
 
 def flight_limits(mission: Mission, reserve: Reserve) -> FlightLimits:
     """The limits that plans of this mission keep, when they use no more of them than `reserve` leaves."""
-    limits, wider = mission.limits, 1.0 + reserve.distance_share
+    limits, least_m = mission.limits, reserve.gnss_margin_m if mission.site is Site.OUTDOOR else 0.0
     cap_m = mission.planner.clearance_cap_m
+
+    def wider(distance_m: float) -> float:
+        return distance_m + max(reserve.distance_share * distance_m, least_m)
+
     return FlightLimits(
         cruise_m_s=limits.cruise_speed_m_s * reserve.limit_share,
         avoidance_m_s=limits.avoidance_speed_m_s * reserve.limit_share,
-        avoidance_distance_m=limits.avoidance_distance_m * wider,
+        avoidance_distance_m=wider(limits.avoidance_distance_m),
         nominal_ratio=reserve.nominal_share / reserve.limit_share,
         acceleration_m_s2=limits.acceleration_m_s2,
         braking_m_s2=limits.acceleration_m_s2 * reserve.braking_share,
         jerk_m_s3=limits.acceleration_m_s2 * reserve.jerk_per_acceleration_hz,
         climb_tangent=float(np.tan(np.radians(min(limits.climb_angle_deg, 89.0)))),
         turn_radius_m=limits.turn_radius_m,
-        clearance_m=max(limits.clearance_m, limits.body_radius_m) * wider,
-        contact_m=limits.body_radius_m * wider,
+        clearance_m=wider(max(limits.clearance_m, limits.body_radius_m)),
+        contact_m=wider(limits.body_radius_m),
         clearance_cap_m=cap_m if cap_m is not None else 2.0 * max(limits.avoidance_distance_m, limits.clearance_m),
         height_m=limits.height_m,
         corridor_m=reserve.corridor_share * mission.onboard.horizon_m,

@@ -57,12 +57,14 @@ class Plan:
         request: what was asked.
         trajectory: None when there is no path.
         guide: the request's, or one that was led around something.
+        arc_m: how much of this guide is done.
         reaches_end: it comes to rest at the end of the guide.
     """
 
     request: PlanRequest
     trajectory: Trajectory | None
     guide: Guide
+    arc_m: float
     reaches_end: bool = False
 
 
@@ -82,18 +84,18 @@ class Planner:
     ) -> None:
         horizon_m, phi = mission.onboard.horizon_m, mission.planner
         self.limits = flight_limits(mission, reserve)
-        self._required = flight_limits(mission, replace(reserve, distance_share=0.0))
-        self._around = surroundings(mission, obstacles.pack(mission.world.as_known()), zones_m)
+        self._required = flight_limits(mission, replace(reserve, distance_share=0.0, gnss_margin_m=0.0))
+        self.around = surroundings(mission, obstacles.pack(mission.world.as_known()), zones_m)
         self._local = LocalPlanner(
             self.limits,
-            self._around,
+            self.around,
             Horizon(horizon_m, LONGEST_DURATION * horizon_m / mission.limits.cruise_speed_m_s),
             spline_shape(search.control_points),
             search,
             objective_weights(phi.length_weight, phi.clearance_weight, phi.height_weight),
         )
         self._rng = rng
-        self._cell_m = CELLS_PER_VOXEL * mission.onboard.voxel_m
+        self.cell_m = CELLS_PER_VOXEL * mission.onboard.voxel_m
 
     @property
     def horizon_m(self) -> float:
@@ -105,15 +107,16 @@ class Planner:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Plan along the request's guide, which is first led around what blocks it."""
-        guide = lead_around(request.guide, self._around, self.limits, self.horizon_m, self._cell_m)
+        guide = lead_around(request.guide, self.around, self.limits, self.horizon_m, self.cell_m)
         if guide is None or guide is request.guide:  # without a way around, as far as it goes
             return self._plan_along(request, request.guide, request.arc_m)
-        return self._plan_along(request, guide, guide.project(request.start.position_m, 0.0, guide.length_m))
+        from_m = max(request.arc_m - self.horizon_m, 0.0)
+        return self._plan_along(request, guide, guide.project(request.start.position_m, from_m, 2.0 * self.horizon_m))
 
     def is_clear(self, trajectory: Trajectory, now_s: float) -> bool:
         """The rest of a committed trajectory keeps what the mission requires (the reserve is not asked for)."""
         done = min(max(now_s - trajectory.start_s, 0.0), trajectory.duration_s) / trajectory.knot_interval_s
-        return worst_lack(trajectory.control_points_m, done, self._required, self._around) == 0.0
+        return worst_lack(trajectory.control_points_m, done, self._required, self.around) == 0.0
 
     def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
         """Come to rest on the committed path as soon as the limits allow."""
@@ -124,8 +127,8 @@ class Planner:
         plan = self._local.plan(guide.way, arc_m, np.array(request.start), warm, self._rng)
         trajectory = Trajectory(plan.control_m, request.start_s, plan.knot_s)
         if plan.value[HARD] > 0.0 or not self.is_clear(trajectory, request.start_s):
-            return Plan(request, None, guide)
-        return Plan(request, trajectory, guide, plan.goal_arc_m >= guide.length_m)
+            return Plan(request, None, guide, arc_m)
+        return Plan(request, trajectory, guide, arc_m, plan.goal_arc_m >= guide.length_m)
 
     def _warm_way(self, request: PlanRequest, committed: Trajectory, guide: Guide, arc_m: float) -> Way | None:
         """The committed path from the request's start on, and then the guide; None where that is no way at all."""

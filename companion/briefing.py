@@ -1,0 +1,116 @@
+"""What a pilot must know before it can fly: where the autopilot's frame lies, and which track it is to fly."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from companion.settings import PlanningMode
+from missions.errors import WireFormatError
+from missions.frames import AutopilotFrame, GeodeticPoint
+from missions.mission import Mission, Vehicle
+from missions.mission_items import MissionItem, Track, decode_track, plan_id
+from missions.tunnel import Reason
+
+
+@dataclass(frozen=True)
+class FlightOrder:
+    """A mission as it was understood: what to fly, in which frame.
+
+    Args:
+        plan_id: of the mission items.
+        track: decoded, with the vehicle's ground offset.
+        frame: the autopilot's.
+    """
+
+    plan_id: int
+    track: Track
+    frame: AutopilotFrame
+
+
+@dataclass
+class Briefing:
+    """Collects what the autopilot reports, and says what is still missing.
+
+    Args:
+        mission: the mission file.
+        vehicle: this one.
+        mode: with ONBOARD, track points before the last one, the target, are not flown.
+    """
+
+    mission: Mission
+    vehicle: Vehicle
+    mode: PlanningMode = PlanningMode.END_CLOUD
+    origin: GeodeticPoint | None = None
+    home: GeodeticPoint | None = None
+    identity: int = 0
+    """Of the mission that the autopilot has stored; 0 for none."""
+    current_seq: int = 0
+    items: tuple[MissionItem, ...] = ()
+    downloaded_identity: int = 0
+    problem: str = ""
+    """Why the mission was not understood."""
+    _order: FlightOrder | None = field(default=None, repr=False)
+
+    def forget(self) -> None:
+        """The autopilot is gone, perhaps rebooted: everything that it said is void."""
+        self.origin = self.home = self._order = None
+        self.identity = self.downloaded_identity = self.current_seq = 0
+        self.items, self.problem = (), ""
+
+    @property
+    def ground_offset_m(self) -> float:
+        """What the autopilot's altitude reads too high [m]: its home altitude against where its pad is."""
+        assert self.home is not None
+        return self.home.altitude_amsl_m - self.mission.origin.altitude_amsl_m - self.vehicle.pad_m[2]
+
+    @property
+    def frame(self) -> AutopilotFrame | None:
+        """The autopilot's frame, once its origin and home are known."""
+        if self.origin is None or self.home is None:
+            return None
+        return AutopilotFrame(self.origin, self.mission.frame, self.ground_offset_m)
+
+    @property
+    def plan_id(self) -> int:
+        """Of the mission that was downloaded last; 0 for none."""
+        return plan_id(self.items)
+
+    @property
+    def wants_download(self) -> bool:
+        return self.identity not in (0, self.downloaded_identity)
+
+    def accept(self, identity: int, items: tuple[MissionItem, ...]) -> None:
+        """Take over a downloaded mission."""
+        self.downloaded_identity, self.items = identity, items
+        self.decode()
+
+    def decode(self) -> None:
+        """Understand the downloaded mission anew: it, or the frame, has changed."""
+        self._order, self.problem, frame = None, "", self.frame
+        if frame is None or not self.items:
+            return
+        try:
+            track = decode_track(self.items, self.mission.frame, ground_offset_m=frame.ground_offset_m)
+        except WireFormatError as wrong:
+            self.problem = str(wrong)
+            return
+        if not np.all(np.isfinite(track.points_m)):
+            self.problem = "a waypoint is not a place"
+            return
+        if self.mode is PlanningMode.ONBOARD:
+            track = Track(track.points_m[-1:], track.speeds_m_s[-1:], track.item_seq[-1:])
+        self._order = FlightOrder(self.plan_id, track, frame)
+
+    @property
+    def order(self) -> FlightOrder | None:
+        """What is to be flown, once everything is there and understood."""
+        return self._order
+
+    @property
+    def missing(self) -> Reason:
+        """What keeps this vehicle from being ready; NONE when nothing does."""
+        if self.frame is None:
+            return Reason.NO_POSITION
+        if not self.items:
+            return Reason.NO_MISSION
+        return Reason.NONE if self._order is not None else Reason.MISSION_NOT_UNDERSTOOD

@@ -1,0 +1,154 @@
+"""The command line: `companion --vehicle I --mission MISSION`, one process per vehicle."""
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import msgspec
+import numpy as np
+import typer
+
+from companion.app import App
+from companion.deadman import KernelTimer
+from companion.errors import CompanionError, UsageError
+from companion.fault_injection import FaultInjection
+from companion.journal import Journal
+from companion.link.px4 import Px4
+from companion.pilot import Pilot
+from companion.planner.planner import Planner
+from companion.settings import CompanionSettings, PlanningMode
+from companion.warm_up import warm_up
+from missions.errors import MissionError
+from missions.faults import EXAMPLES, Fault, parse_fault
+from missions.frames import GeodeticPoint
+from missions.kernels import one_at_a_time
+from missions.mission import Mission, load_mission
+
+T = TypeVar("T")
+
+FIRST_ONBOARD_PORT = 14540
+LARGEST_INSTANCE_BASE = 46715
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@app.command()
+def companion(
+    vehicle: Annotated[int, typer.Option(min=1, max=250, help="System id of the vehicle; this companion is I/191.")],
+    mission: Annotated[str, typer.Option(help="Mission file, or the name of a shipped mission.")],
+    system: Annotated[str | None, typer.Option(help="Where the autopilot is heard, as MAVSDK writes it.")] = None,
+    speed: Annotated[float, typer.Option(min=0.01, max=1000.0, help="Simulated seconds per second.")] = 1.0,
+    origin: Annotated[str | None, typer.Option(help="LAT,LON,ALT: move the mission there.")] = None,
+    mode: Annotated[PlanningMode, typer.Option(help="Who plans.")] = PlanningMode.END_CLOUD,
+    instance_base: Annotated[
+        int, typer.Option(min=0, max=LARGEST_INSTANCE_BASE, help="Shift the default port by this.")
+    ] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
+    fault: Annotated[list[str] | None, typer.Option(help=f"Something that goes wrong, such as {EXAMPLES[0]}.")] = None,
+    log: Annotated[Path | None, typer.Option(help="Write decisions to this file, one JSON object per line.")] = None,
+    supervised: Annotated[bool, typer.Option("--supervised", help="End when standard input does.")] = False,
+    deadman_s: Annotated[
+        float, typer.Option(min=0.05, max=10.0, help="A companion that hangs in flight for so long is ended.")
+    ] = 0.5,
+) -> None:
+    """Fly one vehicle: plan locally along the mission that its autopilot has stored, and stream offboard setpoints.
+
+    It waits for its autopilot, downloads the mission, and flies when the ground station says MISSION_START.
+    Ctrl-C (or SIGTERM) leaves the vehicle holding.
+
+    Examples:  companion --vehicle 1 --mission indoor  |  companion --vehicle 2 --mission indoor --speed 5
+    |  companion --vehicle 1 --mission field --system udpin://0.0.0.0:14540 --origin 47.397,8.545,489
+    """
+    url = system or f"udpin://127.0.0.1:{FIRST_ONBOARD_PORT + vehicle - 1 + instance_base}"
+    try:
+        settings = CompanionSettings(
+            vehicle=vehicle, system_url=url, speed=speed, mode=mode, seed=seed, deadman_s=deadman_s
+        )
+        loaded = _mission(mission, origin, vehicle)
+        faults = [parse_fault(text) for text in fault or []]
+        with Journal(vehicle, log) as journal:
+            left_well = asyncio.run(_fly(settings, loaded, faults, journal, supervised=supervised))
+    except (CompanionError, MissionError) as problem:
+        print(f"companion: {problem}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    if not left_well:
+        raise typer.Exit(1)
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    app()
+
+
+def _mission(path_or_name: str, origin: str | None, vehicle: int) -> Mission:
+    mission = load_mission(path_or_name)
+    mission.vehicle(vehicle)
+    return mission if origin is None else mission.moved_to(_place(origin))
+
+
+def _place(text: str) -> GeodeticPoint:
+    """LAT,LON,ALT.
+
+    Raises:
+        UsageError: it is not that.
+    """
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+        values = {"latitude_deg": latitude, "longitude_deg": longitude, "altitude_amsl_m": altitude}
+        return msgspec.convert(values, GeodeticPoint)
+    except (ValueError, msgspec.ValidationError) as wrong:
+        raise UsageError(f"--origin {text}: expected LAT,LON,ALT such as 47.397,8.545,489 ({wrong})") from None
+
+
+async def _fly(
+    settings: CompanionSettings, mission: Mission, faults: list[Fault], journal: Journal, *, supervised: bool
+) -> bool:
+    """Prepare, then work until the end; whether the vehicle was left as it should be."""
+    vehicle = mission.vehicle(settings.vehicle)
+    zones_m = np.array([mission.start_m(vehicle), *(target.position_m for target in mission.targets)])
+    planner = Planner(mission, settings.reserve, settings.search, np.random.default_rng(settings.seed), zones_m)
+    journal.tell("preparing the planner (a fresh machine compiles it once, which takes half a minute)")
+    with one_at_a_time("companion"):
+        warm_up(planner, mission, vehicle)
+    with ThreadPoolExecutor(1, thread_name_prefix="planner") as threads:
+        loop = asyncio.get_running_loop()
+
+        async def work(call: Callable[[], T]) -> T:
+            return await loop.run_in_executor(threads, call)
+
+        companion = App(
+            settings,
+            Pilot(mission, settings, planner),
+            planner,
+            Px4(settings.vehicle, settings.system_url, journal.tell),
+            work,
+            KernelTimer(settings.deadman_s),
+            FaultInjection(faults, settings.vehicle),
+            journal,
+        )
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, companion.request_stop)
+        if supervised:
+            _end_with_parent(companion.request_stop)
+        journal.tell(f"waiting for the autopilot on {settings.system_url}")
+        return await companion.run()
+
+
+def _end_with_parent(request_stop: Callable[[], None]) -> None:
+    """Stop at the end of standard input: the program that started this one is gone."""
+    loop = asyncio.get_running_loop()
+
+    def read() -> None:
+        if not os.read(sys.stdin.fileno(), 4096):
+            loop.remove_reader(sys.stdin.fileno())
+            request_stop()
+
+    try:
+        loop.add_reader(sys.stdin.fileno(), read)
+    except (OSError, ValueError):
+        raise UsageError("--supervised: expected standard input to be a pipe") from None
