@@ -20,8 +20,9 @@ from missions.tunnel import Reason, TrajectoryKind, TrajectoryMessage
 
 Array = npt.NDArray[np.float64]
 
-NEARLY_DONE_S = 1.0
+NEARLY_DONE_S = 2.0
 """A trajectory that reaches its target so soon is not replanned for its age."""
+PROGRESS_INTERVAL_S = 0.1
 
 
 class Flight:
@@ -47,6 +48,7 @@ class Flight:
         self._heading = Heading(odometry.yaw_rad, settings.yaw_rate_rad_s, settings.yaw_above_m_s)
         self._odometry = odometry
         self._last_s = now_s
+        self._advanced_s = -np.inf
         self._asked: PlanRequest | None = None
         self._asked_order = order
         self._retry_at_s = now_s
@@ -82,8 +84,10 @@ class Flight:
     def tick(self, now_s: float, odometry_age_s: float) -> Iterator[Instruction]:
         """Stream on; look ahead; ask for a plan when there is a reason."""
         yield instructions.SendSetpoint(self.setpoint(now_s))
-        self.course.advance(now_s)
-        yield from self._announce_progress()
+        if now_s - self._advanced_s >= PROGRESS_INTERVAL_S:
+            self._advanced_s = now_s
+            self.course.advance(now_s)
+            yield from self._announce_progress()
         trouble = self._trouble(now_s, odometry_age_s)
         if trouble is not Reason.NONE and self.holding is Reason.NONE:
             yield from self.brake(trouble, now_s)
