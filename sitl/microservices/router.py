@@ -36,7 +36,8 @@ class Router:
         return (target, component) in there
 
     def is_for_autopilot(self, message: Message) -> bool:
-        """Whether the autopilot itself is meant, alone or among others."""
+        """Whether the autopilot itself is meant, alone or among others; nobody obeys a command to everybody."""
         target = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
-        return target in (0, self._sysid) and component in (0, AUTOPILOT_COMPID)
+        everybody = target == 0 and not message.get_type().startswith("COMMAND")
+        return (everybody or target == self._sysid) and component in (0, AUTOPILOT_COMPID)

@@ -1,0 +1,119 @@
+"""The `sitl` program: starts, says so, takes no port from others, and leaves nothing behind."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from sitl.dialect import mavlink
+from tests.integration.sitl_process import SITL, GroundStation, free_instance_base, running_sitl
+
+pytestmark = pytest.mark.processes
+
+
+@pytest.fixture
+def base() -> int:
+    return free_instance_base()
+
+
+@pytest.fixture
+def ground(base) -> Iterator[GroundStation]:
+    station = GroundStation(base)
+    yield station
+    station.close()
+
+
+def test_it_sends_at_once_to_all_its_peers_and_obeys(base, ground):
+    with running_sitl("--vehicles", "2", "--speed", "5", base=base):
+        ground.until(lambda: ground.last("HEARTBEAT", 1) and ground.last("HEARTBEAT", 2))
+        ground.until(lambda: ground.last("HEARTBEAT", 2).system_status == 3)
+        ground.send(mavlink.MAVLink_command_long_message(2, 1, 400, 0, 1, *[0] * 6), sysid=2)
+        ack = ground.until(lambda: ground.last("COMMAND_ACK", 2))
+        assert (ack.command, ack.result) == (400, 0)
+        ground.until(lambda: ground.last("HEARTBEAT", 2).base_mode & 128)
+        assert not ground.last("HEARTBEAT", 1).base_mode & 128
+
+
+def test_simulated_time_passes_at_the_ordered_speed(base, ground):
+    with running_sitl("--vehicles", "1", "--speed", "4", base=base):
+        first = ground.until(lambda: ground.last("ATTITUDE")).time_boot_ms
+        begin_s = time.monotonic()
+        ground.until(lambda: ground.last("ATTITUDE").time_boot_ms > first + 6000)
+        assert time.monotonic() - begin_s == pytest.approx(1.5, abs=0.4)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_end_it_cleanly(base, number):
+    with running_sitl("--vehicles", "1", base=base) as process:
+        process.send_signal(number)
+        assert process.wait(10.0) == 0
+        assert process.stderr.read() == ""
+
+
+def test_a_supervised_simulator_ends_with_its_parent(base):
+    with running_sitl("--vehicles", "1", base=base) as process:
+        process.stdin.close()
+        assert process.wait(10.0) == 0
+
+
+def test_a_port_in_use_is_named(base):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 14580 + base + 1))
+        command = [str(SITL), "--vehicles", "3", "--instance-base", str(base)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 2
+    assert f"127.0.0.1:{14580 + base + 1} (onboard link of vehicle 2) is in use" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ((), "expected a MISSION or --vehicles"),
+        (("indoor", "--vehicles", "2"), "expected a MISSION or --vehicles"),
+        (("no-such-mission",), "no shipped mission of that name"),
+        (("indoor", "--origin", "north pole"), "--origin north pole: expected LAT,LON,ALT"),
+        (("indoor", "--origin", "95,0,0"), "--origin 95,0,0: expected LAT,LON,ALT"),
+        (("indoor", "--speed", "0"), "--speed"),
+        (("--vehicles", "0"), "--vehicles"),
+        (("indoor", "--airframe", "zeppelin"), "--airframe"),
+        (("indoor", "--truth", "/no/such/folder/truth.csv"), "/no/such/folder/truth.csv"),
+    ],
+)
+def test_bad_usage_is_explained(base, arguments, complaint):
+    command = [str(SITL), *arguments, "--instance-base", str(base)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=200, stdin=subprocess.DEVNULL)
+    assert done.returncode == 2
+    assert complaint in done.stderr.replace("\n", " ")
+    assert "Traceback" not in done.stderr
+
+
+def test_the_truth_survives_a_kill(base, tmp_path):
+    path = tmp_path / "truth.csv"
+    with running_sitl("indoor", "--speed", "5", "--truth", str(path), base=base) as process:
+        time.sleep(1.0)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait(10.0)
+    lines = path.read_text().splitlines()
+    assert lines[0] == "t_s,sysid,east_m,north_m,up_m,ve_m_s,vn_m_s,vu_m_s"
+    assert float(lines[-2].split(",")[0]) > 3.0
+
+
+def test_a_mission_is_moved_to_its_origin(base, ground):
+    with running_sitl("indoor", "--origin", "-33.85,151.2,20", base=base):
+        place = ground.until(lambda: ground.last("GLOBAL_POSITION_INT"))
+    assert place.lat == pytest.approx(-338_500_000, abs=2000)
+    assert place.alt == pytest.approx(20_000, abs=500)
+
+
+def test_garbage_on_its_ports_does_no_harm(base, ground):
+    with running_sitl("--vehicles", "1", base=base):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            for datagram in (b"", b"\xfd", b"\xfd\xff\x00\x00" * 40, os.urandom(500)):
+                stranger.sendto(datagram, ("127.0.0.1", 18570 + base))
+                stranger.sendto(datagram, ("127.0.0.1", 14580 + base))
+        ground.send(mavlink.MAVLink_command_long_message(1, 1, 401, 0, *[0] * 7))
+        assert ground.until(lambda: ground.last("COMMAND_ACK")).result == 0

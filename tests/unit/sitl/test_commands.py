@@ -1,0 +1,168 @@
+"""Every command has PX4's answer, whoever asks, and a repeated copy has no second effect."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sitl.dialect import mavlink
+from sitl.microservices.outbox import Link
+from tests.unit.sitl.flown import NAN, Flown, place
+
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
+
+ON_THE_GROUND = [
+    *[(number, (), UNSUPPORTED) for number in (16, 17, 92, 115, 183, 193, 207, 208, 224, 2000, 31000, 40000, 65000)],
+    *[(number, (), None) for number in (211, 420, 1000, 3000)],
+    *[(number, (), ACCEPTED) for number in (20, 21, 401, 410, 520)],
+    (178, (1, 3), ACCEPTED),
+    (178, (1, -5), ACCEPTED),
+    (179, (1,), ACCEPTED),
+    (179, (0, 0, 0, 0, 47.4, 8.5, 480.0), ACCEPTED),
+    (179, (0, 0, 0, 0, NAN, 8.5, 480.0), DENIED),
+    (185, (0,), DENIED),
+    (192, (-1, 1, 0, NAN, 47.9, 8.5, 500.0), ACCEPTED),
+    (192, (-1, 0, 0, NAN, 47.9, 8.5, 500.0), UNSUPPORTED),
+    (192, (-1, 1, 0, NAN, 147.9, 8.5, 500.0), DENIED),
+    (246, (1,), UNSUPPORTED),
+    (262, (5,), ACCEPTED),
+    (262, (99,), FAILED),
+    (300, (), DENIED),
+    (400, (math.inf,), DENIED),
+    (510, (30,), ACCEPTED),
+    (510, (1e9,), DENIED),
+    (511, (30, 20000), ACCEPTED),
+    (511, (99999, 20000), FAILED),
+    (511, (30, NAN), DENIED),
+    (512, (148,), ACCEPTED),
+    (512, (340,), DENIED),
+    (512, (NAN,), DENIED),
+]
+
+
+@pytest.mark.parametrize(("number", "params", "result"), ON_THE_GROUND)
+def test_answers_on_the_ground(number, params, result):
+    assert Flown().boot().command(number, *params) == result
+
+
+def test_the_answer_is_for_the_asker_on_its_link():
+    flown = Flown().boot()
+    flown.command(401, link=Link.ONBOARD)
+    ack = flown.last("COMMAND_ACK", link=Link.ONBOARD)
+    assert (ack.target_system, ack.target_component) == (1, 191)
+    assert not flown.messages("COMMAND_ACK", link=Link.GROUND)
+
+
+@pytest.mark.parametrize(
+    ("target", "heard"), [((1, 1), True), ((1, 0), True), ((1, 50), False), ((77, 1), False), ((0, 0), False)]
+)
+def test_commands_for_others_are_met_with_silence(target, heard):
+    flown = Flown().boot()
+    flown.send(mavlink.MAVLink_command_long_message(*target, 400, 0, 1, *[0] * 6))
+    flown.run(0.1)
+    assert bool(flown.messages("COMMAND_ACK")) == heard
+    assert flown.armed == heard
+
+
+def test_a_repeated_copy_is_acknowledged_again_without_a_second_effect():
+    flown = Flown().boot()
+    assert flown.command(400, 1) == ACCEPTED
+    assert flown.command(400, 0) == ACCEPTED
+    for confirmation in (1, 2, 3):
+        assert flown.command(400, 0, confirmation=confirmation) == ACCEPTED
+    assert flown.texts.count("Disarmed by external command") == 1
+    flown.command(400, 1)
+    assert flown.command(400, 0) == ACCEPTED  # a new order
+    assert not flown.armed
+
+
+def test_a_copy_counts_when_the_first_was_lost():
+    flown = Flown().boot()
+    assert flown.command(400, 1, confirmation=1) == ACCEPTED
+    assert flown.armed
+
+
+def test_repositions_fly_to_the_place_at_the_amsl_altitude():
+    flown = Flown().take_off(4.0)
+    x, y = place(6.0, -4.0)
+    assert flown.command(192, -1, 1, 0, math.pi / 2, x * 1e-7, y * 1e-7, 489.4 + 7.0) == ACCEPTED
+    flown.run(15.0)
+    assert np.allclose(flown.position, [-4.0, 6.0, 7.0], atol=0.15)
+    assert flown.autopilot.snapshot.yaw_rad == pytest.approx(math.pi / 2, abs=0.1)
+
+
+@pytest.mark.parametrize("frame", [0, 3, 5, 6, 11])
+def test_command_int_repositions_take_amsl_in_every_frame(frame):
+    flown = Flown().take_off(4.0)
+    x, y = place(3.0, 0.0)
+    flown.send(mavlink.MAVLink_command_int_message(1, 1, frame, 192, 0, 0, -1, 1, 0, NAN, x, y, 489.4 + 6.0))
+    flown.run(10.0)
+    assert flown.last("COMMAND_ACK").result == ACCEPTED
+    assert np.allclose(flown.position, [0.0, 3.0, 6.0], atol=0.15)
+
+
+def test_numbers_left_out_keep_what_there_is_and_nothing_at_all_is_a_pause():
+    flown = Flown().take_off(4.0)
+    flown.command(192, -1, 1, 0, NAN, NAN, NAN, 489.4 + 6.0)
+    flown.run(8.0)
+    assert np.allclose(flown.position, [0.0, 0.0, 6.0], atol=0.15)
+    x, y = place(60.0, 0.0)
+    flown.command(192, -1, 1, 0, NAN, x * 1e-7, y * 1e-7, NAN)
+    flown.run(5.0)
+    flown.command(192, -1, 1, 0, NAN, NAN, NAN, NAN)
+    flown.run(10.0)
+    assert flown.position[1] < 30.0
+    assert np.linalg.norm(flown.velocity) < 0.1
+
+
+def test_a_reposition_takes_a_vehicle_off_that_holds_on_the_ground():
+    flown = Flown().boot()
+    flown.command(400, 1)
+    x, y = place(0.0, 0.0)
+    assert flown.command(192, -1, 1, 0, NAN, x * 1e-7, y * 1e-7, 489.4 + 4.0) == ACCEPTED
+    flown.run(12.0)
+    assert flown.height == pytest.approx(4.0, abs=0.2)
+
+
+def test_change_speed_holds_for_what_is_flown_next():
+    flown = Flown().take_off(4.0)
+    flown.command(178, 1, 2.0)
+    x, y = place(40.0, 0.0)
+    flown.command(192, -1, 1, 0, NAN, x * 1e-7, y * 1e-7, 493.4)
+    flown.run(8.0)
+    assert flown.velocity[1] == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_reboot_in_the_air_is_denied():
+    assert Flown().take_off(3.0).command(246, 1) == DENIED
+
+
+def test_requested_messages_come_once():
+    flown = Flown().boot()
+    for number, name in (
+        (148, "AUTOPILOT_VERSION"),
+        (49, "GPS_GLOBAL_ORIGIN"),
+        (242, "HOME_POSITION"),
+        (331, "ODOMETRY"),
+    ):
+        flown.forget()
+        assert flown.command(512, number) == ACCEPTED
+        assert len(flown.messages(name)) == 1, name
+
+
+def test_the_modes_can_be_asked_for():
+    flown = Flown().boot()
+    flown.command(512, 435, 0)
+    modes = flown.messages("AVAILABLE_MODES")
+    assert len(modes) == modes[0].number_modes
+    assert {m.custom_mode for m in modes} >= {0x03040000, 0x00060000}
+    flown.forget()
+    flown.command(512, 435, 2)
+    assert [m.mode_index for m in flown.messages("AVAILABLE_MODES")] == [2]
+
+
+def test_the_autopilot_says_what_it_can():
+    flown = Flown().boot()
+    flown.command(512, 148)
+    capabilities = flown.last("AUTOPILOT_VERSION").capabilities
+    assert capabilities == 0xE8FF & ~mavlink.MAV_PROTOCOL_CAPABILITY_FTP  # PX4's, but for what is not here
