@@ -28,7 +28,11 @@ class FaultInjection:
             self._since_s = now_s
         if self._since_s is None or not self._faults or now_s - self._since_s < self._faults[0].at_s:
             return
-        match self._faults.pop(0):
+        self.carry_out(self._faults.pop(0))
+
+    def carry_out(self, fault: Fault) -> None:
+        """Do it, to this process."""
+        match fault:
             case CompanionKill():
                 os.kill(os.getpid(), signal.SIGKILL)
             case CompanionHang():

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
-from gcs.dialect import GCS_SYSTEM, Message, mavlink
+from gcs.dialect import Message, mavlink
 from gcs.errors import LinkLost
 from gcs.fleet.fleet import Fleet
 from gcs.fleet.vehicle_state import VehicleState
@@ -63,13 +63,14 @@ class Station:
         """Take in one datagram."""
         now_s = self.now_s
         for message in self.codec.parse(datagram):
-            if message.get_srcSystem() in {0, GCS_SYSTEM}:
-                continue  # our own frames, forwarded back to us
+            source = (message.get_srcSystem(), message.get_srcComponent())
+            if source == (self.codec.system, self.codec.component) or source[0] == 0:
+                continue  # our own frame, forwarded back to us, or nobody's
             if self.recording is not None:
                 self.recording.write(message.get_msgbuf(), self.unix_us())
-            self._routes[message.get_srcSystem()] = (connection, address)
+            self._routes[source[0]] = (connection, address)
             self.fleet.fold(message, now_s)
-            for inbox in self._inboxes.get((message.get_srcSystem(), message.get_srcComponent()), ()):
+            for inbox in self._inboxes.get(source, ()):
                 if message.get_type() in inbox.wants:
                     inbox.queue.put_nowait(message)
 

@@ -31,16 +31,18 @@ class SourceCount:
 
 @dataclass
 class Codec:
-    """One ground station's end of MAVLink 2.
+    """One end of MAVLink 2; the ground station's, unless said otherwise.
 
     Malformed, truncated and MAVLink 1 frames are counted and dropped.
     """
 
+    system: int = GCS_SYSTEM
+    component: int = GCS_COMPONENT
     malformed: int = 0
     sources: dict[tuple[int, int], SourceCount] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._sender = mavlink.MAVLink(None, GCS_SYSTEM, GCS_COMPONENT)
+        self._sender = mavlink.MAVLink(None, self.system, self.component)
         self._parser = _new_parser()
 
     def parse(self, datagram: bytes) -> list[Message]:
@@ -57,7 +59,7 @@ class Codec:
         return [message for message in messages if self._accept(message)]
 
     def pack(self, message: Message) -> bytes:
-        """The frame of a message from 255/190, with the next sequence number."""
+        """The frame of a message of ours, with the next sequence number."""
         frame = message.pack(self._sender)
         self._sender.seq = (self._sender.seq + 1) % 256
         return bytes(frame)

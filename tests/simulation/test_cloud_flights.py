@@ -4,10 +4,15 @@ import msgspec
 import numpy as np
 import pytest
 
+from gcs.settings import PlanningMode
 from missions.mission import LinkSettings, Mission, load_mission
 from tests.simulation.whole_system import WholeSystem
 
 INDOOR = load_mission("indoor")
+
+
+def fly_by_cloud(mission: Mission, seed: int = 0) -> WholeSystem:
+    return WholeSystem(mission, PlanningMode.CLOUD, seed=seed)
 
 
 def on_a_bad_link(mission: Mission, **link: float) -> Mission:
@@ -17,7 +22,7 @@ def on_a_bad_link(mission: Mission, **link: float) -> Mission:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_both_drones_cross_the_room_and_land_at_their_targets(seed: int):
-    report = WholeSystem(INDOOR, seed=seed).fly()
+    report = fly_by_cloud(INDOOR, seed=seed).fly()
     assert report.success, report.reason
     for vehicle in report.vehicles:
         assert vehicle.landed
@@ -29,7 +34,7 @@ def test_both_drones_cross_the_room_and_land_at_their_targets(seed: int):
 
 
 def test_one_seed_is_one_flight_to_the_bit():
-    one, other = WholeSystem(INDOOR, seed=4), WholeSystem(INDOOR, seed=4)
+    one, other = fly_by_cloud(INDOOR, seed=4), fly_by_cloud(INDOOR, seed=4)
     assert one.fly() == other.fly()
     np.testing.assert_array_equal(one.flown()[1].positions_m, other.flown()[1].positions_m)
     assert [event.text for event in one.events.events] == [event.text for event in other.events.events]
@@ -37,18 +42,18 @@ def test_one_seed_is_one_flight_to_the_bit():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_bad_link_delays_a_flight_and_changes_nothing_else(seed: int):
-    report = WholeSystem(on_a_bad_link(INDOOR, loss=0.15, delay_s=0.1, jitter_s=0.05), seed=seed).fly()
+    report = fly_by_cloud(on_a_bad_link(INDOOR, loss=0.15, delay_s=0.1, jitter_s=0.05), seed=seed).fly()
     assert report.success, report.reason
     assert sum(vehicle.link.lost for vehicle in report.vehicles) > 0
 
 
 def test_a_link_cut_in_mid_flight_does_not_end_it():
-    report = WholeSystem(load_mission("indoor-link-loss"), seed=1).fly()
+    report = fly_by_cloud(load_mission("indoor-link-loss"), seed=1).fly()
     assert report.success, report.reason
 
 
 def test_a_vehicle_that_stands_elsewhere_is_not_armed():
-    elsewhere = WholeSystem(INDOOR)
+    elsewhere = fly_by_cloud(INDOOR)
     moved = msgspec.structs.replace(INDOOR.vehicles[1], pad_m=(1.0, 10.5, 0.0))
     elsewhere.mission = msgspec.structs.replace(INDOOR, vehicles=(INDOOR.vehicles[0], moved))
     report = elsewhere.fly()
@@ -58,7 +63,7 @@ def test_a_vehicle_that_stands_elsewhere_is_not_armed():
 
 
 def test_without_the_missions_consent_no_parameter_is_touched():
-    report = WholeSystem(msgspec.structs.replace(INDOOR, set_parameters=False)).fly()
+    report = fly_by_cloud(msgspec.structs.replace(INDOOR, set_parameters=False)).fly()
     assert not report.success
     assert "COM_OBL_RC_ACT is 0, expected 5" in report.reason
     assert "set_parameters: true" in report.reason

@@ -1,13 +1,22 @@
-"""The whole system in one process: ground station and simulator, and what flies between them, on one virtual clock."""
+"""The whole system in one process: ground station, simulator and companions on one virtual clock."""
 
 import asyncio
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from companion.app import App
+from companion.fault_injection import FaultInjection
+from companion.journal import Journal
+from companion.pilot import Pilot
+from companion.planner.planner import Planner
+from companion.settings import CompanionSettings
+from gcs.dialect import Mode
 from gcs.errors import GcsError
 from gcs.flight.events import EventLog
 from gcs.flight.report import FlightReport, Flown, make_report
@@ -16,19 +25,51 @@ from gcs.planner import plan_mission
 from gcs.planner.plan import FleetPlan
 from gcs.settings import PlanningMode
 from gcs.station import Station
-from missions.mission import Mission
+from missions.faults import Fault
+from missions.mission import Mission, Vehicle
 from sitl.fleet import TICK_S
 from sitl.microservices.outbox import Link
 from sitl.simulator import Simulator
 from tests.simulation import virtual_time
+from tests.simulation.simulated_autopilot import SimulatedAutopilot
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
 
 
 @functools.cache
 def planned(mission_json: bytes, seed: int) -> FleetPlan:
     """A plan, made once for all tests that fly the same mission with the same seed."""
     return plan_mission(msgspec.json.decode(mission_json, type=Mission), seed=seed)
+
+
+PLANNING_TIME_S = 0.01
+"""A companion's plan takes so long in vehicle time; it is made at once, so that no run depends on the machine."""
+
+
+class Died(BaseException):
+    """A fault has ended a companion; no `except Exception` of the companion's may catch it."""
+
+
+class NoDeadMan:
+    """The kernel's timer would end the whole simulation."""
+
+    def feed(self) -> None: ...
+
+    def disarm(self) -> None: ...
+
+
+class Mortality(FaultInjection):
+    """Ends one companion instead of the process."""
+
+    def carry_out(self, fault: Fault) -> None:
+        raise Died
+
+
+async def _work(call: Callable[[], T]) -> T:
+    result = call()
+    await asyncio.sleep(PLANNING_TIME_S)
+    return result
 
 
 class GroundWire:
@@ -54,16 +95,26 @@ class WholeSystem:
     """
 
     mission: Mission
-    mode: PlanningMode = PlanningMode.CLOUD
+    mode: PlanningMode = PlanningMode.END_CLOUD
     seed: int = 0
     truth: list[tuple[float, Array, Array]] = field(default_factory=list)
     """(time [s], positions (n, 3), velocities (n, 3)) of every tick."""
+
+    faults: tuple[Fault, ...] = ()
 
     def __post_init__(self) -> None:
         self.simulator = Simulator(self.mission, seed=self.seed)
         self.station = Station(unix_us=lambda: 0)
         self.wire = GroundWire(self.simulator)
         self.station.connections.append(self.wire)
+        self.autopilots: dict[int, SimulatedAutopilot] = {}
+        self.companions: dict[int, App] = {}
+        self.companion_missions = {vehicle.sysid: self.mission for vehicle in self.mission.vehicles}
+        """What each companion has read; tests may give one something else."""
+        self.deaths: dict[int, float] = {}
+        """When a fault ended a companion, in simulated time."""
+        self.modes: dict[int, list[tuple[float, Mode]]] = {vehicle.sysid: [] for vehicle in self.mission.vehicles}
+        """(time, mode) of every change of mode that the ground station heard of."""
         self.error: GcsError | None = None
 
     def fly(self) -> FlightReport:
@@ -75,6 +126,8 @@ class WholeSystem:
         self.flight = FleetFlight(self.station, self.mission, self.mode, self._plan, self.events)
         async with asyncio.TaskGroup() as group:
             background = [group.create_task(self.simulate()), group.create_task(self.station.send_heartbeats())]
+            if self.mode.needs_companions:
+                background += [group.create_task(self._companion(vehicle)) for vehicle in self.mission.vehicles]
             try:
                 await self.flight.fly()
             except GcsError as problem:
@@ -98,6 +151,32 @@ class WholeSystem:
     async def _plan(self, mission: Mission) -> FleetPlan:
         return planned(msgspec.json.encode(mission), self.seed)
 
+    async def _companion(self, vehicle: Vehicle) -> None:
+        """One companion, until it is cancelled or a fault ends it."""
+        mission = self.companion_missions[vehicle.sysid]
+        settings = CompanionSettings(vehicle=vehicle.sysid, system_url="", seed=self.seed)
+        zones_m = np.array([mission.start_m(vehicle), *(target.position_m for target in mission.targets)])
+        rng = np.random.default_rng(self.seed)
+        planner = Planner(mission, settings.reserve, settings.search, rng, zones_m)
+        autopilot = self.autopilots[vehicle.sysid] = SimulatedAutopilot(self.simulator, vehicle.sysid)
+        companion = App(
+            settings,
+            Pilot(mission, settings, planner),
+            planner,
+            autopilot,
+            _work,
+            NoDeadMan(),
+            Mortality(self.faults, vehicle.sysid),
+            Journal(vehicle.sysid, None, say=lambda _: None),
+            cpu_clock=lambda: 0.0,
+        )
+        self.companions[vehicle.sysid] = companion
+        try:
+            await companion.run()
+        except* Died:
+            autopilot.close()
+            self.deaths[vehicle.sysid] = self.simulator.time_s
+
     async def simulate(self) -> None:
         """Advance the simulator and carry its messages, until cancelled."""
         while True:
@@ -107,4 +186,13 @@ class WholeSystem:
             for sysid, link, frame in self.simulator.transmissions():
                 if link is Link.GROUND:
                     self.station.receive(self.wire, frame, ("simulator", sysid))
+                elif sysid in self.autopilots:
+                    self.autopilots[sysid].receive_frame(frame)
+            self._note_modes()
             await asyncio.sleep(TICK_S)
+
+    def _note_modes(self) -> None:
+        for sysid, changes in self.modes.items():
+            state = self.station.fleet.vehicles.get(sysid)
+            if state is not None and (not changes or changes[-1][1] is not state.mode):
+                changes.append((self.simulator.time_s, state.mode))

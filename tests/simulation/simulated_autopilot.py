@@ -1,0 +1,171 @@
+"""A companion's link to a simulated vehicle, in memory: plain MAVLink instead of MAVSDK."""
+
+import asyncio
+import math
+from typing import Any
+
+import msgspec
+
+from companion.errors import CommandRefused
+from companion.events import AutopilotFound, Event, FlightMode, Sender, StartCommanded
+from companion.instructions import CommandResult
+from companion.link.messages import EVENTS_OF, OdometryMessage
+from companion.setpoints import Setpoint
+from gcs.dialect import AUTOPILOT, COMPANION, Mode, mavlink
+from gcs.errors import GcsError
+from gcs.flight import actions
+from gcs.link.codec import Codec
+from gcs.microservices.command_client import Command, CommandClient
+from gcs.microservices.mission_transfer_client import MissionDownload
+from gcs.station import Station
+from missions.mission_items import MissionItem
+from missions.tunnel import PayloadType, Reason
+from sitl.microservices.outbox import Link
+from sitl.simulator import Simulator
+
+RATES_HZ = {331: 30.0, 436: 10.0, 245: 5.0, 242: 1.0}
+GPS_GLOBAL_ORIGIN = 49
+HEARTBEAT_INTERVAL_S = 1.0
+YAW_RATE_IGNORED = 0x800
+MODES = {
+    FlightMode.OFFBOARD: Mode.OFFBOARD,
+    FlightMode.HOLD: Mode.HOLD,
+    FlightMode.LAND: Mode.LAND,
+    FlightMode.RTL: Mode.RTL,
+}
+
+
+class OnboardWire:
+    """The onboard link of one vehicle, in memory."""
+
+    peer = None
+
+    def __init__(self, simulator: Simulator, sysid: int) -> None:
+        self._simulator, self._sysid = simulator, sysid
+
+    def send(self, datagram: bytes, address: tuple[str, int]) -> None:
+        self._simulator.receive(self._sysid, Link.ONBOARD, datagram)
+
+
+class SimulatedAutopilot:
+    """See `companion.link.autopilot.Autopilot`."""
+
+    def __init__(self, simulator: Simulator, sysid: int) -> None:
+        self._sysid = sysid
+        self._peer = (sysid, AUTOPILOT)
+        self._wire = OnboardWire(simulator, sysid)
+        self._station = Station(codec=Codec(sysid, COMPANION))
+        self._reader = Codec(sysid, COMPANION)
+        self._events: asyncio.Queue[Event] = asyncio.Queue()
+        self._tasks: list[asyncio.Task[None]] = []
+        self._found = asyncio.Event()
+        self.streaming = False
+        """Setpoints are being sent."""
+
+    def receive_frame(self, frame: bytes) -> None:
+        """A frame that the vehicle has sent on its onboard link."""
+        if not self._tasks:
+            return  # not opened yet, or closed
+        self._station.receive(self._wire, frame, ("onboard", self._sysid))
+        for message in self._reader.parse(frame):
+            if message.get_srcComponent() == AUTOPILOT:
+                self._read(message)
+            elif message.get_type() == "COMMAND_LONG" and message.command == mavlink.MAV_CMD_MISSION_START:
+                self._events.put_nowait(StartCommanded(Sender(message.get_srcSystem(), message.get_srcComponent())))
+
+    async def open(self) -> None:
+        group = asyncio.get_running_loop()
+        self._tasks = [group.create_task(self._send_heartbeats()), group.create_task(self._ask_for_streams())]
+
+    def close(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        self._tasks = []
+        self.streaming = False
+
+    async def receive(self) -> Event:
+        return await self._events.get()
+
+    def send_setpoint(self, setpoint: Setpoint) -> None:
+        self.streaming = True
+        self._send(
+            mavlink.MAVLink_set_position_target_local_ned_message(
+                0,
+                *self._peer,
+                mavlink.MAV_FRAME_LOCAL_NED,
+                YAW_RATE_IGNORED,
+                *setpoint.position_m.tolist(),
+                *setpoint.velocity_m_s.tolist(),
+                *setpoint.acceleration_m_s2.tolist(),
+                setpoint.yaw_rad,
+                0.0,
+            )
+        )
+
+    def end_setpoints(self) -> None:
+        self.streaming = False
+
+    async def command_mode(self, mode: FlightMode) -> None:
+        await self._command(actions.set_mode(MODES[mode]))
+
+    async def download_mission(self) -> tuple[MissionItem, ...]:
+        try:
+            return tuple((await self._station.run(MissionDownload(self._peer))).items)
+        except GcsError as problem:
+            raise CommandRefused(str(problem)) from None
+
+    async def set_current_item(self, seq: int) -> None:
+        self._send(mavlink.MAVLink_mission_set_current_message(*self._peer, seq))
+
+    def acknowledge_start(self, sender: Sender, result: CommandResult, reason: Reason) -> None:
+        fields = (mavlink.MAV_CMD_MISSION_START, int(result), 0, int(reason), sender.system, sender.component)
+        self._send(mavlink.MAVLink_command_ack_message(*fields))
+
+    def send_tunnel(self, kind: PayloadType, payload: bytes) -> None:
+        padded = list(payload.ljust(128, b"\0"))
+        self._send(mavlink.MAVLink_tunnel_message(0, 0, int(kind), len(payload), padded))
+
+    async def _send_heartbeats(self) -> None:
+        kind = mavlink.MAV_TYPE_ONBOARD_CONTROLLER
+        heartbeat = mavlink.MAVLink_heartbeat_message(kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+        while True:
+            self._send(heartbeat)
+            await asyncio.sleep(HEARTBEAT_INTERVAL_S)
+
+    async def _ask_for_streams(self) -> None:
+        await self._found.wait()
+        for message_id, rate_hz in RATES_HZ.items():
+            await self._command(actions.set_message_interval(message_id, rate_hz))
+        await self._command(actions.request_message(GPS_GLOBAL_ORIGIN))
+
+    async def _command(self, command: Command) -> None:
+        try:
+            await self._station.run(CommandClient(command, self._peer))
+        except GcsError as problem:
+            raise CommandRefused(str(problem)) from None
+
+    def _send(self, message: Any) -> None:
+        self._wire.send(self._station.codec.pack(message), ("onboard", self._sysid))
+
+    def _read(self, message: Any) -> None:
+        name = message.get_type()
+        if name == "HEARTBEAT" and not self._found.is_set():
+            self._found.set()
+            self._events.put_nowait(AutopilotFound())
+        if name in EVENTS_OF:
+            for event in EVENTS_OF[name](_as_mavsdk_has_it(message)):
+                self._events.put_nowait(event)
+        elif name == "ODOMETRY":
+            self._events.put_nowait(msgspec.json.decode(_as_mavsdk_has_it(message), type=OdometryMessage).event())
+
+
+def _as_mavsdk_has_it(message: Any) -> bytes:
+    """A message's fields as JSON, NaN as null."""
+    fields = {name: _without_nan(getattr(message, name)) for name in message.get_fieldnames()}
+    return msgspec.json.encode(fields)
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_without_nan(part) for part in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
