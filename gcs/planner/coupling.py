@@ -58,7 +58,7 @@ def at_fractions(points_m: Array, chords_m: Array, out_m: Array, side: IntArray,
         while m < n_sides - 1 and begin + chords_m[m] < at:
             begin += chords_m[m]
             m += 1
-        along = min(max((at - begin) / max(chords_m[m], 1e-9), 0.0), 1.0)
+        along = min(max((at - begin) / chords_m[m], 0.0), 1.0)
         side[k], share[k] = m, along
         for axis in range(3):
             out_m[k, axis] = points_m[m, axis] + along * (points_m[m + 1, axis] - points_m[m, axis])
@@ -88,7 +88,7 @@ def from_fractions(
             by_point[m, axis] += (1.0 - a) * by_place[k, axis]
             by_point[m + 1, axis] += a * by_place[k, axis]
             by_share += by_place[k, axis] * (points_m[m + 1, axis] - points_m[m, axis])
-        by_share /= max(chords_m[m], 1e-9)
+        by_share /= chords_m[m]
         if 0 < k < n_fractions - 1:
             everywhere += by_share * k / (n_fractions - 1)
             before[m] -= by_share

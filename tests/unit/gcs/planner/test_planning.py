@@ -127,12 +127,21 @@ def test_a_maze_is_flown_through_on_a_guide_path():
         assert 30.0 < vehicle.length_m < 41.0
 
 
+def test_a_vehicle_whose_target_is_where_it_starts_stays_there():
+    mission = room(targets_m=((19.0, 6.0, 1.5), (1.0, 8.0, 1.5)))
+    plan = plan_mission(mission, evaluations=QUICKLY)
+    assert plan.violations == ()
+    assert plan.vehicles[1].length_m < 1e-3
+    assert plan.vehicles[0].length_m == pytest.approx(18.0, abs=0.5)
+
+
 @pytest.mark.parametrize(
     ("mission", "limit", "vehicles"),
     [
         (room(wall(10.0, None)), Limit.CLEARANCE, {"v1", "v2"}),
         (room(range_m=17.0), Limit.RANGE, {"v1", "v2"}),
         (room(endurance_s=5.0), Limit.ENDURANCE, {"v1", "v2"}),
+        (room(endurance_s=1.0), Limit.ENDURANCE, {"v1", "v2"}),
         (room(separation_m=2.5), Limit.SEPARATION, {"v1"}),
         (room(mean_separation_m=(15.0, 20.0)), Limit.LEAST_MEAN_SEPARATION, {"v1", "v2"}),
         (
@@ -141,7 +150,15 @@ def test_a_maze_is_flown_through_on_a_guide_path():
             {"v1"},
         ),
     ],
-    ids=["closed wall", "short range", "short endurance", "starts too close", "room too small", "too steep"],
+    ids=[
+        "closed wall",
+        "short range",
+        "short endurance",
+        "no endurance",
+        "starts too close",
+        "room too small",
+        "too steep",
+    ],
 )
 def test_what_cannot_be_planned_is_not_called_feasible_and_the_reason_is_given(
     mission: Mission, limit: Limit, vehicles: set[str]
