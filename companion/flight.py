@@ -125,9 +125,12 @@ class Flight:
 
     def has_arrived(self, now_s: float) -> bool:
         """At rest at the target; a vehicle that does not quite get there has arrived after a while as well."""
-        overdue = now_s > self.course.latest.end_s + self._crew.settings.arrival_timeout_s
+        if not (self.course.reaches_end and self._new_order is None and self.is_at_rest(now_s)):
+            return False
+        settings = self._crew.settings
         near = self._error_m(now_s) < 0.5 * self._crew.mission.site.arrival_tolerance_m
-        return self.course.reaches_end and self._new_order is None and self.is_at_rest(now_s) and (near or overdue)
+        slow = bool(np.linalg.norm(self._odometry.velocity_m_s) < settings.arrived_m_s)
+        return (near and slow) or now_s > self.course.latest.end_s + settings.arrival_timeout_s
 
     def setpoint(self, now_s: float) -> Setpoint:
         """What the vehicle shall be doing now."""

@@ -40,7 +40,7 @@ class SearchSettings:
     control_points: int = 12
     """Of one local trajectory: three hold the start, three the end at rest, the others are free."""
     particles: int = 50
-    iterations: int = 30
+    iterations: int = 15
     archive_size: int = 24
     patience_generations: int = 3
     """k of the leader rule."""
@@ -80,6 +80,8 @@ class PilotSettings:
     """A copy of MISSION_START that was on its way when a pilot took control does not take it back."""
     odometry_timeout_s: float = 1.0
     """Without odometry for so long the vehicle is braked."""
+    arrived_m_s: float = 0.5
+    """Faster than this a vehicle at its target has not arrived yet."""
     arrival_timeout_s: float = 5.0
     """At the end of the last trajectory, the vehicle is given so long to settle."""
     yaw_rate_rad_s: float = 0.8
