@@ -2,6 +2,7 @@
 
 import colorsys
 from enum import Enum
+from functools import cache
 
 Rgb = tuple[int, int, int]
 
@@ -49,6 +50,7 @@ class Tone(Enum):
     BAD = "bad"
 
 
+@cache
 def vehicle_colour(index: int) -> Rgb:
     """The colour of the vehicle at this place of the fleet's order; beyond the palette, evenly spread hues."""
     if index < len(PALETTE):
@@ -69,8 +71,9 @@ def faded(colour: Rgb, towards: Rgb = GROUND, share: float = 0.5) -> Rgb:
     return red, green, blue
 
 
+@cache
 def vivid(colour: Rgb) -> Rgb:
     """The colour that has to be drawn in the scene to look like `colour`: its renderer bleaches what is bright."""
     hue, lightness, saturation = colorsys.rgb_to_hls(*(channel / 255 for channel in colour))
-    red, green, blue = colorsys.hls_to_rgb(hue, lightness * 0.7, min(1.0, saturation * 1.3))
+    red, green, blue = colorsys.hls_to_rgb(hue, lightness * 0.76, min(1.0, saturation * 1.15))
     return round(red * 255), round(green * 255), round(blue * 255)

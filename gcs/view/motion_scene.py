@@ -6,13 +6,17 @@ Of each trail only the newest part is sent at every update; what is older is sea
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 import viser
 
 from gcs.desk import Desk
 from gcs.flight.trails import Trails
+from gcs.view import lines
 from gcs.view.colours import Rgb, faded, vivid
 from gcs.view.lines import AHEAD, CHUNK, AheadLine, TrailLine
 from gcs.view.sightings import Sighting
+
+Array = npt.NDArray[np.float64]
 
 TRAIL_PX, AHEAD_PX = 2.5, 5.0
 WHITE: Rgb = (255, 255, 255)
@@ -43,12 +47,15 @@ class MotionScene:
         if not seen:
             return
         for sighting in seen:
-            self._seal(desk, sighting)
-        tails = np.concatenate([self._past[sighting.sysid].tail(sighting.position_m) for sighting in seen])
-        ahead = np.concatenate([self._segments_ahead(sighting, now_s) for sighting in seen])
+            self._seal(sighting)
+            companion_heard = sighting.state.companion_online(now_s)
+            self._future.setdefault(sighting.sysid, AheadLine()).take(sighting.state.companion, alive=companion_heard)
+        positions_m = np.array([sighting.position_m for sighting in seen])
+        tails = lines.tails([self._past[sighting.sysid] for sighting in seen], positions_m)
+        ahead = lines.ways_ahead([self._future[sighting.sysid] for sighting in seen], positions_m)
         if [sighting.sysid for sighting in seen] != self._drawn:
             self._drawn = [sighting.sysid for sighting in seen]
-            self._tails = self._live("tails", tails, [faded(vivid(s.colour), share=0.1) for s in seen], CHUNK, TRAIL_PX)
+            self._tails = self._live("tails", tails, [_trail_colour(s) for s in seen], CHUNK, TRAIL_PX)
             self._ahead = self._live(
                 "ahead", ahead, [faded(vivid(s.colour), WHITE, 0.2) for s in seen], AHEAD, AHEAD_PX
             )
@@ -63,27 +70,26 @@ class MotionScene:
             handle.remove()
         self._trails, self._past, self._sealed = trails, {}, []
 
-    def _seal(self, desk: Desk, sighting: Sighting) -> None:
+    def _seal(self, sighting: Sighting) -> None:
         line = self._past.setdefault(sighting.sysid, TrailLine(self._spacing_m))
-        trail = desk.trails.by_sysid.get(sighting.sysid) if desk.trails is not None else None
+        trail = self._trails.by_sysid.get(sighting.sysid) if self._trails is not None else None
         if trail is None:
             return
         first = line.sealed
         for index, chunk in enumerate(line.take(trail)):
             name = f"/trails/{sighting.sysid}/{first + index}"
-            colour = faded(vivid(sighting.colour), share=0.1)
+            colour = _trail_colour(sighting)
             handle = self._scene.add_line_segments(name, chunk, colour, thickness=TRAIL_PX, thickness_units="screen")
             self._sealed.append(handle)
 
-    def _segments_ahead(self, sighting: Sighting, now_s: float) -> np.ndarray:
-        line = self._future.setdefault(sighting.sysid, AheadLine())
-        alive = sighting.state.companion_online(now_s)
-        return line.segments(sighting.state.companion, sighting.position_m, alive=alive)
-
     def _live(
-        self, name: str, segments: np.ndarray, own: Sequence[Rgb], per_vehicle: int, width_px: float
+        self, name: str, segments: Array, own: Sequence[Rgb], per_vehicle: int, width_px: float
     ) -> viser.LineSegmentsHandle:
         tints = np.repeat(np.array(own, dtype=np.uint8), per_vehicle, axis=0)[:, None].repeat(2, axis=1)
         return self._scene.add_line_segments(
             f"/fleet/{name}", segments, tints, thickness=width_px, thickness_units="screen"
         )
+
+
+def _trail_colour(sighting: Sighting) -> Rgb:
+    return faded(vivid(sighting.colour), share=0.1)

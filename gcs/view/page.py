@@ -73,14 +73,15 @@ class Page:
             self._vehicles.move(self._seen, lens)
             self._motion.update(self._desk, self._seen, now_s)
             self._cameras.move(self._seen)
-            tags = [*self._vehicle_tags(now_s), *self._target_tags]
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + TELL_INTERVAL_S
                 self._desk.collect_texts()
                 self._show_plan()
-                self._tags.show(tags, lens)
+                self._tags.show([*self._vehicle_tags(now_s), *self._target_tags], lens)
                 self._panels.update(self._seen, now_s)
-            self._tags.move(tags, lens)
+            self._tags.move(
+                np.array([tagged.position_m for tagged in self._seen] + self._targets_m).reshape(-1, 3), lens
+            )
 
     def _vehicle_tags(self, now_s: float) -> list[Tag]:
         return [
@@ -99,14 +100,16 @@ class Page:
         """The world, or where there is no mission a plain; how large it is [m]."""
         mission = self._desk.mission
         self._world: WorldScene | None = None
+        self._targets_m: list[Array] = []
         self._target_tags: list[Tag] = []
         if mission is None:
             self._server.scene.add_grid("/world/plain", infinite_grid=True, **PLAIN)
             self._cameras = Cameras(self._server, WATCHED_M[0], WATCHED_M[1], 1)
             return float(np.linalg.norm(WATCHED_M[1] - WATCHED_M[0]))
+        self._targets_m = [np.array(target.position_m) for target in mission.targets]
         self._target_tags = [
-            Tag(f"target {target.name}", target.name, np.array(target.position_m), TARGET, TARGET_PX, TARGET_TAG_SCALE)
-            for target in mission.targets
+            Tag(f"target {target.name}", target.name, place_m, TARGET, TARGET_PX, TARGET_TAG_SCALE)
+            for target, place_m in zip(mission.targets, self._targets_m, strict=True)
         ]
         self._world = WorldScene(self._server, mission, simulated=self._desk.simulated)
         bounds = mission.world.bounds

@@ -8,13 +8,14 @@ import numpy.typing as npt
 import viser
 
 from gcs.view.colours import Rgb
-from gcs.view.labels import Lens, lifts_px, tag_width_px
+from gcs.view.labels import Lens, offsets_px, tag_width_px
 
 Array = npt.NDArray[np.float64]
 
 STEM_WIDTH_PX = 1.0
 BLIND_LIFT_M = 0.4
 """How far up a tag stands as long as no camera is known."""
+STILL_M = 1e-6
 
 
 @dataclass(frozen=True)
@@ -41,34 +42,38 @@ class TagScene:
         self._scene = scene
         self._labels: dict[str, viser.LabelHandle] = {}
         self._stems: viser.LineSegmentsHandle | None = None
-        self._lifts_px = np.zeros(0)
+        self._offsets_px = np.zeros((0, 2))
+        self._feet_m = np.zeros((0, 3))
 
     def show(self, tags: Sequence[Tag], lens: Lens | None) -> None:
-        """Bring texts up to date, and settle anew how far up each tag stands."""
+        """Bring texts up to date, and settle anew where each tag stands."""
         if [tag.key for tag in tags] != list(self._labels):
             self._build(tags)
         for tag in tags:
             self._labels[tag.key].text = tag.text
-        self._lifts_px = np.zeros(len(tags))
         if lens is not None and tags:
             anchors_px = lens.project(np.array([tag.anchor_m for tag in tags]))
             widths_px = [tag_width_px(tag.text) * tag.scale for tag in tags]
-            self._lifts_px = lifts_px(anchors_px, widths_px, [tag.span_px for tag in tags])
+            spans_px = [tag.span_px for tag in tags]
+            picture_px = (float(lens.width_px), float(lens.height_px))
+            self._offsets_px = offsets_px(anchors_px, widths_px, spans_px, picture_px, self._offsets_px)
 
-    def move(self, tags: Sequence[Tag], lens: Lens | None) -> None:
-        """Bring the tags to where what they name is now."""
-        if self._stems is None or [tag.key for tag in tags] != list(self._labels):
-            return
-        anchors_m = np.array([tag.anchor_m for tag in tags])
-        feet_m = anchors_m + self._lifts_m(anchors_m, lens)
-        for tag, foot_m in zip(tags, feet_m, strict=True):
-            self._labels[tag.key].position = foot_m
+    def move(self, anchors_m: Array, lens: Lens | None) -> None:
+        """Bring the tags to where what they name is now: (n, 3), in the order in which they are shown."""
+        if self._stems is None or len(anchors_m) != len(self._labels):
+            return  # a vehicle has come or gone since they were shown
+        feet_m = anchors_m + self._offsets_m(anchors_m, lens)
+        moved = np.abs(feet_m - self._feet_m).max(axis=1) > STILL_M
+        for label, foot_m, has_moved in zip(self._labels.values(), feet_m, moved.tolist(), strict=True):
+            if has_moved:
+                label.position = foot_m
+        self._feet_m = feet_m
         self._stems.points = np.stack((anchors_m, feet_m), axis=1).astype(np.float32)
 
-    def _lifts_m(self, anchors_m: Array, lens: Lens | None) -> Array:
+    def _offsets_m(self, anchors_m: Array, lens: Lens | None) -> Array:
         if lens is None:
             return np.broadcast_to([0.0, 0.0, BLIND_LIFT_M], anchors_m.shape)
-        return (self._lifts_px * lens.metres_per_pixel(anchors_m))[:, None] * lens.up
+        return (self._offsets_px * lens.metres_per_pixel(anchors_m)[:, None]) @ lens.picture_axes
 
     def _build(self, tags: Sequence[Tag]) -> None:
         for label in self._labels.values():
@@ -79,6 +84,7 @@ class TagScene:
             )
             for tag in tags
         }
+        self._feet_m, self._offsets_px = np.full((len(tags), 3), np.inf), np.zeros((len(tags), 2))
         nowhere = np.zeros((len(tags), 2, 3))
         colours = np.array([[tag.colour] * 2 for tag in tags], dtype=np.uint8).reshape(-1, 2, 3)
         self._stems = self._scene.add_line_segments(

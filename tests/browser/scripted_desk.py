@@ -51,8 +51,8 @@ class ScriptedVehicle:
     plan: VehiclePlan | None = None
     time_s: float = 0.0
     clock_s: float = 10.0
-    commands: list[tuple[int, float]] = field(default_factory=list)
-    """Of every command received: its number and param2."""
+    commands: list[tuple[int, float, float]] = field(default_factory=list)
+    """Of every command received: its number, param2 and param3."""
 
     def fly_on(self, seconds: float) -> None:
         """Let time pass; along the plan only while the companion steers."""
@@ -84,7 +84,7 @@ class ScriptedVehicle:
         """What it answers to one message of the ground station."""
         if message.get_type() != "COMMAND_LONG" or message.target_system != self.sysid:
             return []
-        self.commands.append((message.command, message.param2))
+        self.commands.append((message.command, message.param2, message.param3))
         if message.command == mavlink.MAV_CMD_DO_SET_MODE:
             main, sub = int(message.param2), int(message.param3)
             self.mode = Mode(sub << 24 | main << 16)
@@ -234,11 +234,11 @@ class ScriptedDesk:
         assert self.desk.trails is not None
         self.desk.trails.sample(self.air.station.fleet, {})
 
-    async def run(self, interval_s: float = 0.1, *, moving: bool = True) -> None:
-        """Fly on, or stand still, until cancelled."""
+    async def run(self, interval_s: float = 0.1, *, pace: float = 0.1) -> None:
+        """Fly on until cancelled: in slow motion, since a browser that draws in software is slow to begin."""
         while True:
             for vehicle in self.vehicles:
-                vehicle.fly_on(interval_s if moving else 1e-6)
+                vehicle.fly_on(interval_s * pace)
             self.say()
             self.sample()
             for part in self.desk.flight.vehicles.values() if self.desk.flight else ():
