@@ -37,6 +37,7 @@ Array = npt.NDArray[np.float64]
 STEP_S = 0.004
 STEPS_PER_TICK = 5
 TICK_S = STEP_S * STEPS_PER_TICK
+NO_MOVERS = np.zeros((0, 4))
 
 _MOTORS_OFF, _ATTITUDE, _RATES = (int(Guidance[name]) for name in ("MOTORS_OFF", "ATTITUDE", "RATES"))
 _FLIGHT, _NOT_TAKEN_OFF = int(TakeoffStage.FLIGHT), int(TakeoffStage.DISARMED)
@@ -105,8 +106,9 @@ class Fleet:
 
     def _mover_rows(self, time_s: float) -> Array:
         """(k, 4) centre NED and radius [m] of the world's movers."""
-        rows = [(*swap_enu_ned(mover.position(time_s)), mover.radius_m) for mover in self._movers]
-        return np.array(rows, dtype=float).reshape(-1, 4)
+        if not self._movers:
+            return NO_MOVERS
+        return np.array([(*swap_enu_ned(mover.position(time_s)), mover.radius_m) for mover in self._movers])
 
 
 def _solid_and_terrain(mission: Mission) -> tuple[Obstacles, Obstacles]:

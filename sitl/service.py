@@ -30,7 +30,7 @@ async def serve(simulator: Simulator, settings: Settings) -> None:
         await _watch_standard_input(stop)
     links = FleetLinks(simulator, settings)
     with TruthLog(settings.truth) if settings.truth else contextlib.nullcontext() as log:
-        await links.open()
+        links.open()
         try:
             _say_ready(simulator, settings)
             await _until(stop, run(simulator, links, settings, log))

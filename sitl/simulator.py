@@ -92,7 +92,7 @@ class Simulator:
         self._first_takeoff_s: float | None = None
         self._out: list[tuple[int, Link, bytes]] = []
         self.collisions: list[Collision] = []
-        self._known_crashes = np.zeros(len(mission.vehicles), dtype=np.int64)
+        self._known_crashes = {vehicle.sysid: float(Crash.NONE) for vehicle in mission.vehicles}
         views = self._fleet.views()
         self.vehicles = {
             vehicle.sysid: Vehicle(
@@ -149,8 +149,10 @@ class Simulator:
             vehicle.tick(snapshot, now_s, TICK_S)
             if self._first_takeoff_s is None and not snapshot.grounded:
                 self._first_takeoff_s = now_s
+            if snapshot.crash != self._known_crashes[sysid]:
+                self._known_crashes[sysid] = snapshot.crash
+                self._note_collision(sysid)
             self._collect(sysid, vehicle)
-        self._note_collisions()
 
     def transmissions(self) -> list[tuple[int, Link, bytes]]:
         """What the vehicles have sent since the last call: (system id, link, one frame), in order."""
@@ -181,17 +183,13 @@ class Simulator:
         arrived = ground.arrived(Direction.DOWN, self.time_s)
         self._out.extend((sysid, Link.GROUND, frame) for frame in arrived)
 
-    def _note_collisions(self) -> None:
-        crashes = self._fleet.vehicles["crash"]
-        if np.array_equal(crashes, self._known_crashes):
-            return
-        sysids, positions = tuple(self.vehicles), self._fleet.positions_enu_m
-        for index in np.nonzero(crashes != self._known_crashes)[0].tolist():
-            east, north, up = positions[index].tolist()
-            what = Crash(int(crashes[index]))
-            other = self._name_of(what, int(self._fleet.vehicles["crash_other"][index]))
-            self.collisions.append(Collision(self.time_s, sysids[index], what, (east, north, up), other))
-        self._known_crashes = crashes.copy()
+    def _note_collision(self, sysid: int) -> None:
+        index = tuple(self.vehicles).index(sysid)
+        body = self._fleet.vehicles[index]
+        east, north, up = self._fleet.positions_enu_m[index].tolist()
+        what = Crash(int(body["crash"]))
+        other = self._name_of(what, int(body["crash_other"]))
+        self.collisions.append(Collision(self.time_s, sysid, what, (east, north, up), other))
 
     def _name_of(self, what: Crash, index: int) -> str:
         if what is Crash.MOVER:

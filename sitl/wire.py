@@ -14,9 +14,11 @@ from fastcrc.crc16 import mcrf4xx
 
 from sitl.dialect import Message, mavlink
 
-_HEADER = struct.Struct("<BBBBBBBHB")
 _CRC = struct.Struct("<H")
 _MAGIC = 0xFD
+_MAGIC_BYTE = bytes([_MAGIC])
+HEADER_BYTES, OLD_HEADER_BYTES = 10, 6
+"""Of MAVLink 2 and 1."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,8 @@ class Layout:
 
     name: str
     message_id: int
+    id_bytes: bytes
+    """The id in three bytes, lowest first."""
     crc_extra: bytes
     pack: Callable[..., bytes]
     to_wire: Callable[[Sequence[Any]], Sequence[Any]] | None
@@ -48,6 +52,7 @@ def layout_of(message_class: type) -> Layout:
     return Layout(
         name=kind.msgname,
         message_id=kind.id,
+        id_bytes=kind.id.to_bytes(3, "little"),
         crc_extra=bytes([kind.crc_extra]),
         pack=kind.unpacker.pack,
         to_wire=None if order == sorted(order) else operator.itemgetter(*order),
@@ -93,19 +98,16 @@ class FrameWriter:
     def wrap(self, layout: Layout, payload: bytes) -> bytes:
         """One frame around a payload in wire order; its trailing zeros are not sent."""
         payload = payload.rstrip(b"\0") or b"\0"
-        message_id = layout.message_id
-        header = _HEADER.pack(
-            _MAGIC, len(payload), 0, 0, self._seq, self._sysid, self._compid, message_id & 0xFFFF, message_id >> 16
-        )
-        self._seq = (self._seq + 1) & 0xFF
-        crc = mcrf4xx(header[1:] + payload + layout.crc_extra, 0xFFFF)
-        return header + payload + _CRC.pack(crc)
+        seq, self._seq = self._seq, (self._seq + 1) & 0xFF
+        low, middle, high = layout.id_bytes
+        body = bytes((len(payload), 0, 0, seq, self._sysid, self._compid, low, middle, high)) + payload
+        return _MAGIC_BYTE + body + _CRC.pack(mcrf4xx(body + layout.crc_extra, 0xFFFF))
 
 
 def payload_of(message: Message, n_bytes: int) -> bytes:
     """The first bytes of a received message's payload; the zeros that were not sent are put back."""
     frame = message.get_msgbuf()
-    start = _HEADER.size if frame[0] == _MAGIC else 6  # MAVLink 2, 1
+    start = HEADER_BYTES if frame[0] == _MAGIC else OLD_HEADER_BYTES
     return bytes(frame[start : start + min(frame[1], n_bytes)]).ljust(n_bytes, b"\0")
 
 

@@ -75,7 +75,8 @@ class Commander:
         """The mode that is flown."""
         if self._terminated_s is not None:
             return Mode.TERMINATION
-        return MODE_OF_ACTION.get(self._failsafes.action, self.intended)
+        action = self._failsafes.action
+        return self.intended if action <= Action.WARN else MODE_OF_ACTION.get(action, self.intended)
 
     @property
     def failsafe(self) -> Action:

@@ -108,6 +108,9 @@ class Failsafes:
 
     def update(self, failing: Mapping[Cause, bool], now_s: float) -> bool:
         """Take in what fails; returns whether something worse is done than before."""
+        if not self._active and not any(failing.values()):
+            self.action = self.delayed = Action.NONE
+            return False
         for cause, fails in failing.items():
             self._update_cause(cause, fails)
         wanted = max((a.action for a in self._active.values() if not a.overruled), default=Action.NONE)

@@ -29,12 +29,8 @@ class GroundLink:
         self._rng = rng
         self._flying: dict[Direction, list[tuple[float, int, bytes]]] = {way: [] for way in Direction}
         self._order = itertools.count()
+        self.is_perfect = settings == LinkSettings()
         self.sent = self.lost = 0
-
-    @property
-    def is_perfect(self) -> bool:
-        s = self._settings
-        return s.loss == 0.0 and s.delay_s == 0.0 and s.jitter_s == 0.0 and not s.blackouts
 
     def send(self, way: Direction, datagram: bytes, now_s: float, since_takeoff_s: float | None) -> None:
         """Put a datagram on its way.

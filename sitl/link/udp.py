@@ -1,10 +1,10 @@
 """The sockets of a fleet: two UDP ports per vehicle, one MAVLink message per datagram, paced by the loop's clock."""
 
 import asyncio
+import contextlib
 import errno
 import socket
 import sys
-from collections.abc import Callable
 
 from sitl.errors import PortInUse
 from sitl.fleet import TICK_S
@@ -16,21 +16,11 @@ from sitl.simulator import Simulator
 SLIP_S = 0.1
 """Farther behind the clock than this, the simulation gives the lost time up instead of racing after it."""
 RECEIVE_BUFFER_BYTES = 1 << 20
+LARGEST_DATAGRAM_BYTES = 65536
+MOST_AT_ONCE = 64
+"""Datagrams of one port that are taken in before the others have their turn."""
 
 Address = tuple[str, int]
-
-
-class _Endpoint(asyncio.DatagramProtocol):
-    """One port: hands every datagram to the simulator."""
-
-    def __init__(self, receive: Callable[[bytes], None]) -> None:
-        self._receive = receive
-
-    def datagram_received(self, data: bytes, addr: Address) -> None:
-        self._receive(data)
-
-    def error_received(self, exc: Exception) -> None:
-        """Nobody listens at the other end, which is none of our business."""
 
 
 class FleetLinks:
@@ -44,11 +34,11 @@ class FleetLinks:
     def __init__(self, simulator: Simulator, settings: Settings) -> None:
         self._simulator = simulator
         self._settings = settings
-        self._transports: dict[tuple[int, Link], asyncio.DatagramTransport] = {}
-        self._peers: dict[tuple[int, Link], Address] = {}
+        self._ends: dict[bool, dict[int, tuple[socket.socket, Address]]] = {True: {}, False: {}}
+        """Is it the ground link -> system id -> socket and peer."""
 
-    async def open(self) -> None:
-        """Bind all ports.
+    def open(self) -> None:
+        """Bind all ports, and receive on them in the running event loop.
 
         Raises:
             PortInUse: naming the port.
@@ -56,34 +46,43 @@ class FleetLinks:
         try:
             for sysid in self._simulator.vehicles:
                 shift = self._settings.instance_base
-                await self._open_one(sysid, Link.GROUND, GROUND_PORT + sysid - 1 + shift, GCS_PORT + shift)
-                companion_port = COMPANION_PORT + sysid - 1 + shift
-                await self._open_one(sysid, Link.ONBOARD, ONBOARD_PORT + sysid - 1 + shift, companion_port)
+                self._open_one(sysid, Link.GROUND, GROUND_PORT + sysid - 1 + shift, GCS_PORT + shift)
+                self._open_one(
+                    sysid, Link.ONBOARD, ONBOARD_PORT + sysid - 1 + shift, COMPANION_PORT + sysid - 1 + shift
+                )
         except BaseException:
             self.close()
             raise
 
     def send(self) -> None:
-        """Send everything that the simulator has to send."""
+        """Send everything that the simulator has to send; what the kernel has no room for is lost, as on any link."""
         for sysid, link, frame in self._simulator.transmissions():
-            key = (sysid, link)
-            self._transports[key].sendto(frame, self._peers[key])
+            end, peer = self._ends[link is Link.GROUND][sysid]
+            with contextlib.suppress(OSError):
+                end.sendto(frame, peer)
 
     def close(self) -> None:
-        for transport in self._transports.values():
-            transport.close()
+        for ends in self._ends.values():
+            for end, _ in ends.values():
+                asyncio.get_running_loop().remove_reader(end)
+                end.close()
+            ends.clear()
 
-    async def _open_one(self, sysid: int, link: Link, port: int, peer_port: int) -> None:
-        def receive(datagram: bytes) -> None:
-            self._simulator.receive(sysid, link, datagram)
-            self.send()
-
+    def _open_one(self, sysid: int, link: Link, port: int, peer_port: int) -> None:
         host = self._settings.host
-        bound = _bind(host, port, f"{link.value} link of vehicle {sysid}")
-        loop = asyncio.get_running_loop()
-        transport, _ = await loop.create_datagram_endpoint(lambda: _Endpoint(receive), sock=bound)
-        self._transports[sysid, link] = transport
-        self._peers[sysid, link] = (host, peer_port)
+        end = _bind(host, port, f"{link.value} link of vehicle {sysid}")
+        self._ends[link is Link.GROUND][sysid] = end, (host, peer_port)
+        asyncio.get_running_loop().add_reader(end, self._receive, sysid, link, end)
+
+    def _receive(self, sysid: int, link: Link, end: socket.socket) -> None:
+        """Hand all waiting datagrams to the vehicle; an ICMP error of an absent peer is none of our business."""
+        for _ in range(MOST_AT_ONCE):
+            try:
+                datagram = end.recv(LARGEST_DATAGRAM_BYTES)
+            except OSError:
+                break
+            self._simulator.receive(sysid, link, datagram)
+        self.send()
 
 
 def _bind(host: str, port: int, purpose: str) -> socket.socket:

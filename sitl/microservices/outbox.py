@@ -1,5 +1,6 @@
 """Links, who is at their other end, and where services put what they want to send."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -47,6 +48,15 @@ class Outbox:
     def send_to_all(self, message: Message) -> None:
         for link in Link:
             self.send(link, message)
+
+    def sender_of_values(self, link: Link) -> Callable[[Layout, tuple], None]:
+        """`send_values` for one link, for who has much to send."""
+        writer = self._writers[link]
+
+        def send(layout: Layout, values: tuple) -> None:
+            self._frames.append((link, writer.frame(layout, values)))
+
+        return send
 
     def send_values(self, link: Link, layout: Layout, values: tuple) -> None:
         """One message as its values in documented order: the quick way, for streams."""

@@ -60,7 +60,7 @@ class ParameterServer:
     def tick(self) -> None:
         """Send on what has been asked for."""
         for link, queue in self._queues.items():
-            for _ in range(min(PER_TICK, len(queue))):
+            for _ in range(min(PER_TICK, len(queue)) if queue else 0):
                 self._send(link, queue.popleft())
 
     def _send(self, link: Link, name: str) -> None:

@@ -1,5 +1,6 @@
 """Which messages a link gets by itself, and how often: PX4's set at lower rates, changed by SET_MESSAGE_INTERVAL."""
 
+import heapq
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -57,8 +58,7 @@ BY_ID = {LAYOUTS[stream.name].message_id: stream for stream in STREAMS}
 class _Schedule:
     layout: Layout
     build: Build
-    interval_s: float
-    due_s: float
+    interval_s: float = math.inf
 
 
 class Streams:
@@ -72,32 +72,34 @@ class Streams:
 
     def __init__(self, link: Link, outbox: Outbox, tick_s: float) -> None:
         self._link = link
-        self._outbox = outbox
+        self._send = outbox.sender_of_values(link)
         self._tick_s = tick_s
-        self._schedules: dict[str, _Schedule] = {}
+        self._schedules = {stream.name: _Schedule(LAYOUTS[stream.name], stream.build) for stream in STREAMS}
+        self._due: list[tuple[float, str]] = []
+        """When each stream that is on is due, as a heap."""
         for phase, stream in enumerate(STREAMS):
-            self._schedules[stream.name] = _Schedule(LAYOUTS[stream.name], stream.build, 0.0, 0.0)
             self._set(stream.name, self._default_s(stream), phase * tick_s)
 
     def tick(self, moment: Moment) -> None:
         """Send what is due."""
         limit_s = moment.now_s + 0.5 * self._tick_s
-        for schedule in self._schedules.values():
-            if schedule.due_s > limit_s:
-                continue
-            schedule.due_s += schedule.interval_s
-            if schedule.due_s <= limit_s:
-                schedule.due_s = moment.now_s + schedule.interval_s
+        while self._due and self._due[0][0] <= limit_s:
+            due_s, name = self._due[0]
+            schedule = self._schedules[name]
+            next_s = due_s + schedule.interval_s
+            if next_s <= limit_s:
+                next_s = moment.now_s + schedule.interval_s
+            heapq.heapreplace(self._due, (next_s, name))
             values = schedule.build(moment)
             if values is not None:
-                self._outbox.send_values(self._link, schedule.layout, values)
+                self._send(schedule.layout, values)
 
     def send_now(self, name: str, moment: Moment) -> None:
         """Send one message out of turn."""
         schedule = self._schedules[name]
         values = schedule.build(moment)
         if values is not None:
-            self._outbox.send_values(self._link, schedule.layout, values)
+            self._send(schedule.layout, values)
 
     def set_interval(self, message_id: int, interval_us: float, now_s: float) -> bool:
         """SET_MESSAGE_INTERVAL: -1 is off, 0 the default; False for a message that cannot be streamed."""
@@ -121,6 +123,9 @@ class Streams:
         return 1.0 / rate_hz if rate_hz > 0.0 else math.inf
 
     def _set(self, name: str, interval_s: float, first_s: float) -> None:
-        schedule = self._schedules[name]
-        schedule.interval_s = max(interval_s, self._tick_s) if interval_s > 0.0 else math.inf
-        schedule.due_s = first_s if math.isfinite(schedule.interval_s) else math.inf
+        interval_s = max(interval_s, self._tick_s) if interval_s > 0.0 else math.inf
+        self._schedules[name].interval_s = interval_s
+        self._due = [entry for entry in self._due if entry[1] != name]
+        if math.isfinite(interval_s):
+            self._due.append((first_s, name))
+        heapq.heapify(self._due)
