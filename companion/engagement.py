@@ -52,7 +52,7 @@ class Engagement:
 
     def take(self, plan: Plan, odometry: Odometry, now_s: float) -> Iterator[Instruction]:
         """With a path found, enter OFFBOARD; the stream has to be there first."""
-        if self._asked is None or plan.request is not self._asked:
+        if self.plan is not None or plan.request is not self._asked:
             return
         if plan.trajectory is None:
             self.failure = Reason.NO_PATH

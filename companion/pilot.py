@@ -279,7 +279,7 @@ class Pilot:
         self._stopping = True
         yield instructions.Note("stop requested", {"state": self.state.name})
         if self._flight is not None:
-            yield from self._flight.brake(Reason.STOPPED_BY_OPERATOR, now_s)
+            yield from self._with_utc(self._flight.brake(Reason.STOPPED_BY_OPERATOR, now_s))
             self._enter(State.HOLDING, Reason.STOPPED_BY_OPERATOR)
         elif self._engagement is not None and self._engagement.plan is not None:
             yield from self._leave(FlightMode.HOLD, now_s)

@@ -3,6 +3,8 @@
 from companion.crew import Figures
 from missions.tunnel import CompanionState, CompanionStatus, Reason
 
+ROUNDING_S = 1e-3
+
 
 class StatusDesk:
     """Writes the status, at fixed intervals and whenever something in it changes that others act on.
@@ -22,7 +24,7 @@ class StatusDesk:
         self, state: CompanionState, reason: Reason, plan_id: int, track_index: int, figures: Figures, now_s: float
     ) -> CompanionStatus | None:
         """The status, if it is due."""
-        if now_s - self._last_s < self._interval_s and (state, reason, plan_id) == self._last:
+        if abs(now_s - self._last_s) < self._interval_s - ROUNDING_S and (state, reason, plan_id) == self._last:
             return None
         self._last_s, self._last = now_s, (state, reason, plan_id)
         return CompanionStatus(
