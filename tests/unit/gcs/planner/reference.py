@@ -73,14 +73,19 @@ def between(coupling: Coupling, places_m: list[Array]) -> float:
         for b in range(a):
             apart = np.linalg.norm(places_m[a] - places_m[b], axis=1)
             means[a, b] = means[b, a] = np.trapezoid(apart) / (len(apart) - 1)
-            violation += sum(
-                _breach(places_m[a], k, places_m[b], j, coupling) ** 2
-                for k in range(len(apart) - 1)
-                for j in range(coupling.first[k], min(coupling.last[k], len(apart) - 2) + 1)
-            )
+            violation += separation(coupling, places_m[a], places_m[b])
     mean = means.sum(axis=1) / max(n - 1, 1)
     out = np.maximum(mean - coupling.mean_high_m, 0.0) + np.maximum(coupling.mean_low_m - mean, 0.0)
     return violation + float(np.sum((out / coupling.mean_unit_m) ** 2)) * (n > 1)
+
+
+def separation(coupling: Coupling, a: Array, b: Array) -> float:
+    """Violations of the separation of two vehicles at (k, 3) places."""
+    return sum(
+        _breach(a, k, b, j, coupling) ** 2
+        for k in range(len(a) - 1)
+        for j in range(coupling.first[k], min(coupling.last[k], len(a) - 2) + 1)
+    )
 
 
 def _breach(a: Array, k: int, b: Array, j: int, coupling: Coupling) -> float:

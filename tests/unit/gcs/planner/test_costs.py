@@ -15,10 +15,13 @@ from tests.unit.gcs.planner.worlds import everything, room, wall
 
 UNCAPPED = msgspec.structs.replace(load_mission("terrain-1-5uav").planner, clearance_cap_m=None, height_cap_m=None)
 
+NARROW = msgspec.structs.replace(load_mission("terrain-1-5uav").limits, turn_radius_m=900.0, climb_angle_deg=6.0)
+
 MISSIONS = {
     "every kind of obstacle": everything(),
     "no caps": everything(planner=UNCAPPED),
     "time slack and a tight gap": room(wall(10.0, (6.5, 8.0))),
+    "wide turns and gentle climbs": everything(limits=NARROW),
     "one vehicle": load_mission("field"),
 }
 

@@ -123,7 +123,7 @@ def test_legs_stay_near_the_curve_unless_that_takes_too_many(swing_m: float):
 
 def test_outdoors_leg_speeds_are_fine_enough_to_arrive_together():
     mission = load_mission("terrain-1-5uav")
-    curves_m = lines(((0, 0, 0), (2000, 1200, 900)), ((0, 0, 0), (2000, 700, 750)), count=2500)
+    curves_m = lines(((0, 0, 0), (2000, 1200, 900)), ((0, 0, 0), (2000, 680, 280)), count=2500)
     timing = timed(mission, curves_m)
     tracks = [sample_track(mission, curve_m, timing) for curve_m in curves_m]
     lengths_m = path_lengths(curves_m)
