@@ -325,7 +325,7 @@ MEASURED: tuple[tuple[str, Callable[[Airframe], dict[str, float]], dict[str, tup
     (
         "velocity 5 m/s down",
         lambda a: velocity_step(a, 2, 5.0, 6.0, reached_m_s=1.5),
-        {"t63 s": (0.43, "about"), "value m/s": (1.55, "about")},
+        {"t63 s": (0.31, "about"), "value m/s": (1.5, "about")},
     ),
     (
         "brake from 3 m/s",

@@ -1,8 +1,8 @@
 """The PX4 parameters that the compiled control reads, one record per vehicle, fields named as the parameters."""
 
-import numpy as np
+from sitl.dynamics.state import record
 
-GAINS = np.dtype(
+GAINS = record(
     [
         # position and velocity
         ("MPC_XY_P", "f8"),
@@ -71,6 +71,5 @@ GAINS = np.dtype(
         ("MC_YAW_TQ_CUTOFF", "f8"),
         ("IMU_DGYRO_CUTOFF", "f8"),
         ("THR_MDL_FAC", "f8"),
-    ],
-    align=True,
+    ]
 )

@@ -6,9 +6,11 @@ from enum import Enum
 
 import numpy as np
 
+from sitl.dynamics.state import record
+
 GRAVITY_M_S2 = 9.80665
 
-AIRFRAME = np.dtype(
+AIRFRAME = record(
     [
         ("mass_kg", "f8"),
         ("inertia_kg_m2", "f8", 3),
@@ -19,8 +21,7 @@ AIRFRAME = np.dtype(
         ("rotor_lag_s", "f8"),
         ("drag_n_s_m", "f8"),
         ("rotational_drag_n_m_s", "f8"),
-    ],
-    align=True,
+    ]
 )
 """An `Airframe` as compiled code reads it."""
 

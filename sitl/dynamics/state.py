@@ -10,6 +10,11 @@ from enum import IntEnum
 import numpy as np
 
 
+def record(fields: list[tuple]) -> np.dtype:
+    """A record type whose fields are attributes, in compiled code and, with NUMBA_DISABLE_JIT=1, in plain Python."""
+    return np.dtype((np.record, np.dtype(fields, align=True)))
+
+
 class Guidance(IntEnum):
     """Who makes a vehicle's setpoints."""
 
@@ -52,7 +57,7 @@ class Crash(IntEnum):
     """Fallen onto it: that hurts, and is recorded, but what is still whole flies again."""
 
 
-VEHICLE = np.dtype(
+VEHICLE = record(
     [
         # ------------------------------------------------------------- truth
         ("position_m", "f8", 3),
@@ -123,8 +128,7 @@ VEHICLE = np.dtype(
         ("ground_contact", "i8"),
         ("maybe_landed", "i8"),
         ("landed", "i8"),
-    ],
-    align=True,
+    ]
 )
 """One vehicle."""
 

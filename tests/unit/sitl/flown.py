@@ -1,5 +1,6 @@
 """A simulated vehicle and a hand on its links, for tests that read like flights."""
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +15,7 @@ from sitl.dynamics.airframe import X500_LIKE, Airframe
 from sitl.microservices.outbox import Link
 from sitl.settings import open_field
 from sitl.simulator import Simulator
+from sitl.wire import LAYOUTS
 
 NAN = math.nan
 GCS, COMPANION = (255, 190), (1, 191)
@@ -34,6 +36,13 @@ def field(
     return msgspec.structs.replace(mission, world=world or mission.world, simulation=settings)
 
 
+@functools.lru_cache(maxsize=4096)
+def parsed(frame: bytes) -> Any:
+    """The message in a frame."""
+    (message,) = mavlink.MAVLink(None).parse_buffer(frame)
+    return message
+
+
 class Flown:
     """One simulator, seen from the ground link and the onboard link of its first vehicle."""
 
@@ -41,9 +50,8 @@ class Flown:
         self, mission: Mission | None = None, *, seed: int = 1, speed: float = 1.0, airframe: Airframe = X500_LIKE
     ) -> None:
         self.simulator = Simulator(mission or field(), seed=seed, speed=speed, airframe=airframe)
-        self.heard: dict[tuple[int, Link], list[Any]] = {}
+        self._frames: dict[tuple[int, Link], list[bytes]] = {}
         self._codecs = {who: mavlink.MAVLink(None, *who) for who in (GCS, COMPANION)}
-        self._parsers: dict[tuple[int, Link], Any] = {}
         self._setpoint: tuple[Any, int] | None = None
         self.gcs_is_there = False
         """Whether a ground station sends its heartbeats, once a second."""
@@ -67,8 +75,14 @@ class Flown:
         acks = [ack for ack in self.messages("COMMAND_ACK", sysid, link)[before:] if ack.command == number]
         return acks[0].result if acks else None
 
+    def heard(self, link: Link, sysid: int = 1) -> list[bytes]:
+        """All frames that have come over a link, in order."""
+        return self._frames.get((sysid, link), [])
+
     def messages(self, kind: str, sysid: int = 1, link: Link = Link.GROUND) -> list[Any]:
-        return [m for m in self.heard.get((sysid, link), []) if m.get_type() == kind]
+        """The messages of one kind that have come over a link, in order."""
+        message_id = LAYOUTS[kind].id_bytes
+        return [parsed(frame) for frame in self.heard(link, sysid) if frame[7:10] == message_id]
 
     def last(self, kind: str, sysid: int = 1, link: Link = Link.GROUND) -> Any:
         found = self.messages(kind, sysid, link)
@@ -76,7 +90,7 @@ class Flown:
         return found[-1]
 
     def forget(self) -> None:
-        self.heard.clear()
+        self._frames.clear()
 
     @property
     def texts(self) -> list[str]:
@@ -91,8 +105,7 @@ class Flown:
 
     def _listen(self) -> None:
         for sysid, link, frame in self.simulator.transmissions():
-            parser = self._parsers.setdefault((sysid, link), mavlink.MAVLink(None))
-            self.heard.setdefault((sysid, link), []).extend(parser.parse_buffer(frame))
+            self._frames.setdefault((sysid, link), []).append(frame)
 
     # ------------------------------------------------------------------- time
     @property

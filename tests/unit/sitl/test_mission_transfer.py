@@ -7,7 +7,8 @@ import pytest
 
 from sitl.dialect import mavlink
 from sitl.microservices.outbox import Link
-from tests.unit.sitl.flown import NAN, Flown, place, waypoint
+from sitl.wire import LAYOUTS
+from tests.unit.sitl.flown import NAN, Flown, parsed, place, waypoint
 
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE = 0, 1, 2, 3, 4
 
@@ -26,7 +27,8 @@ def square(n: int = 3) -> list[tuple]:
 
 
 def requests(flown: Flown, link: Link = Link.GROUND) -> list:
-    return [m for m in flown.heard.get((1, link), []) if m.get_type() in ("MISSION_REQUEST", "MISSION_REQUEST_INT")]
+    ids = {LAYOUTS[name].id_bytes for name in ("MISSION_REQUEST", "MISSION_REQUEST_INT")}
+    return [parsed(frame) for frame in flown.heard(link) if frame[7:10] in ids]
 
 
 # ---------------------------------------------------------------------- upload
