@@ -25,7 +25,7 @@ SLOWEST_SCALE, FASTEST_SCALE = float(np.log(2.5)), float(np.log(0.9))
 VELOCITY_SHARE = 0.5
 """Highest velocity, as a share of the spread."""
 REACH = 3.0
-"""Positions are kept within so many spreads of the reference."""
+"""Shifts are kept within so many spreads of the reference."""
 FIRST_STEP, LAST_STEP = 0.5, 0.02
 """Steps of the tabu search, as shares of the spread."""
 
@@ -142,9 +142,8 @@ def fly(swarm: Swarm, i: int, lead: Array, progress: float, spread: Array, rng: 
         pull = LEARNING * (rng.random() * (own[i, j] - x[i, j]) + rng.random() * (lead[j] - x[i, j]))
         limit = VELOCITY_SHARE * spread[j]
         velocity[i, j] = min(max(inertia * velocity[i, j] + pull, -limit), limit)  # eq. 7
-        reach = REACH * spread[j]
-        x[i, j] = min(max(x[i, j] + velocity[i, j], -reach), reach)  # eq. 8
-    x[i, 0] = min(max(x[i, 0], FASTEST_SCALE), SLOWEST_SCALE)
+        low, high = (FASTEST_SCALE, SLOWEST_SCALE) if j == 0 else (-REACH * spread[j], REACH * spread[j])
+        x[i, j] = min(max(x[i, j] + velocity[i, j], low), high)  # eq. 8
 
 
 @compiled

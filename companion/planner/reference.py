@@ -94,7 +94,7 @@ def lay_reference(
     settling_s = limits.acceleration_m_s2 / limits.jerk_m_s3
     duration_s = max(times[-1] + settling_s, SHORTEST_S)
     samples = np.zeros((n_samples, 8))
-    sample_in_time(path, times, duration_s, limits.nominal_ratio, samples)
+    sample_in_time(path, times, aims, duration_s, limits.nominal_ratio, samples)
     return Reference(samples, duration_s, arc[-1])
 
 
@@ -170,14 +170,18 @@ def reach_speeds(arc_m: Array, speeds_m_s: Array, start_m_s: float, braking_m_s2
 
 
 @compiled
-def sample_in_time(path: Array, times_s: Array, duration_s: float, nominal_ratio: float, samples: Array) -> None:
-    """Fill `samples` (K + 1, 8) from a path (n, 5) that is passed at (n,) times; it rests in its end."""
+def sample_in_time(
+    path: Array, times_s: Array, speeds_m_s: Array, duration_s: float, nominal_ratio: float, samples: Array
+) -> None:
+    """Fill `samples` (K + 1, 8) from a path (n, 5) that is passed at (n,) times and speeds; it rests in its end."""
     n, j = len(samples), 0
     for k in range(n):
         time_s = min(duration_s * k / (n - 1), times_s[-1])
         while j < len(path) - 2 and times_s[j + 1] < time_s:
             j += 1
-        share = (time_s - times_s[j]) / max(times_s[j + 1] - times_s[j], 1e-9)
+        passed = (time_s - times_s[j]) / max(times_s[j + 1] - times_s[j], 1e-9)
+        gain = (speeds_m_s[j + 1] - speeds_m_s[j]) / max(speeds_m_s[j + 1] + speeds_m_s[j], 1e-9)
+        share = passed * (1.0 - gain * (1.0 - passed))  # constant acceleration between two samples
         for axis in range(3):
             samples[k, axis] = path[j, axis] + share * (path[j + 1, axis] - path[j, axis])
         samples[k, SPEED_CAP] = max(path[j, LEG_SPEED], path[j + 1, LEG_SPEED]) / nominal_ratio
