@@ -1,9 +1,13 @@
 """How long a search may go on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 DEFAULT_EVALUATIONS = 1500
+STUBBORN_EVALUATIONS = 6000
+"""Without a limit, the search goes on so long for its first feasible plan ..."""
+IMPROVING_EVALUATIONS = 500
+"""... and improves that at least so long."""
 
 
 @dataclass(frozen=True)
@@ -16,6 +20,7 @@ class Budget:
         began_s: on `clock`.
         clock: monotonic seconds.
         should_stop: asked often; True ends the search with what it has.
+        settles: whether the default number of evaluations is enough once there is a feasible plan.
     """
 
     evaluations: int | None
@@ -23,6 +28,7 @@ class Budget:
     began_s: float
     clock: Callable[[], float]
     should_stop: Callable[[], bool]
+    settles: bool = False
 
     def share_done(self, evaluations: float) -> float:
         """Share of the budget that is used up after so many evaluations, 0 to 1."""
@@ -32,6 +38,13 @@ class Budget:
         if self.deadline_s is not None:
             shares.append((self.clock() - self.began_s) / (self.deadline_s - self.began_s))
         return min(max(shares), 1.0)
+
+    def settled(self, evaluations: float) -> "Budget":
+        """The budget when a feasible plan is found after so many evaluations, or there seems to be none."""
+        if not self.settles:
+            return self
+        enough = max(DEFAULT_EVALUATIONS, int(evaluations) + IMPROVING_EVALUATIONS)
+        return replace(self, evaluations=enough, settles=False)
 
     def interrupted(self) -> bool:
         """Whether to stop at once: time is up, or somebody wants it."""
@@ -48,9 +61,8 @@ def new_budget(
     clock: Callable[[], float],
     should_stop: Callable[[], bool] | None,
 ) -> Budget:
-    """A budget that begins now; without any limit, `DEFAULT_EVALUATIONS`."""
-    if evaluations is None and budget_s is None:
-        evaluations = DEFAULT_EVALUATIONS
-    began_s = clock()
+    """A budget that begins now; without any limit, `DEFAULT_EVALUATIONS`, or more to find a feasible plan at all."""
+    began_s, unlimited = clock(), evaluations is None and budget_s is None
     deadline_s = None if budget_s is None else began_s + budget_s
-    return Budget(evaluations, deadline_s, began_s, clock, should_stop or (lambda: False))
+    most = STUBBORN_EVALUATIONS if unlimited else evaluations
+    return Budget(most, deadline_s, began_s, clock, should_stop or (lambda: False), settles=unlimited)

@@ -37,7 +37,11 @@ SHOULD_BE_FEASIBLE = 1e-6
 WORTH_JUDGING = 1e-3
 """Relative gain over the best plan so far that makes the judge look before the end."""
 PATIENCE = 2
-"""Rounds after which vehicles without a flyable curve get a guide path."""
+"""Rounds after which vehicles without a flyable curve get a guide path, or a new one."""
+AFRESH_EVALUATIONS = 300
+"""With fewer evaluations left the search does not start afresh."""
+WIDER = 1.25
+"""A new guide path keeps so many times farther away than the one before it."""
 MERIT_STRICTNESS = 100.0
 """Two polished plans are compared with violations weighing so many times more than in the search."""
 MOST_RAISES = 3
@@ -67,7 +71,8 @@ class FleetSearch:
         self, mission: Mission, routes: list[Route], seed: int, budget: Budget, on_progress: Callable[[Progress], None]
     ) -> None:
         self._mission, self._routes, self._budget, self._on_progress = mission, routes, budget, on_progress
-        self._care, self._raises = Care(), 0
+        self._care, self._raises, self._detours = Care(), 0, 0
+        self._paths_m: list[Array | None] = [None] * len(routes)
         self._guides = guides(mission, routes)
         self._settings = EcpsoSettings()
         self._problem = pose(mission, routes, self._guides, self._care)
@@ -92,7 +97,7 @@ class FleetSearch:
                 self._swarms.round()
                 self._iterations += self._settings.window
             self._polish(THOROUGH)
-            if self._best is None and self._iterations == PATIENCE * self._settings.window:
+            if self._best is None and self._iterations % (PATIENCE * self._settings.window) == 0 and self._has_time():
                 self._find_ways_around()
             self._report()
         assert self._present is not None
@@ -100,6 +105,10 @@ class FleetSearch:
             return self._best.candidate
         last = self._judged(self._present.offsets)
         return last if self._best is None or not last.violations else self._best.candidate
+
+    def _has_time(self) -> bool:
+        """Whether starting afresh may still lead to something."""
+        return self._budget.left(self.evaluations) > AFRESH_EVALUATIONS
 
     def _polish(self, stages: tuple[Stage, ...]) -> None:
         """Polish the swarms' plan; take it over if it is better than the present one, and let the judge see it."""
@@ -125,25 +134,36 @@ class FleetSearch:
             candidate = self._judged(refined.offsets)
         if candidate.violations:
             self._look_closer()
-        elif self._best is None or refined.objective < self._best.cost:
+            return
+        if self._best is None:
+            self._budget = self._budget.settled(self.evaluations)
+        if self._best is None or refined.objective < self._best.cost:
             self._best = Approved(candidate, refined.objective)
 
     def _find_ways_around(self) -> None:
-        """Give vehicles that cannot even fly alone a guide path around what is in their way, and start afresh."""
+        """Give vehicles that cannot even fly alone a guide path around what is in their way, and start afresh.
+
+        Each further time the path keeps farther away from everything, and the curves get more control points.
+        """
         stuck = self._swarms.violations_alone(self._swarms.offsets) > LOOKS_FEASIBLE
-        paths = [self._way_around(route) if alone else None for route, alone in zip(self._routes, stuck, strict=True)]
-        corners = max((len(path) for path in paths if path is not None), default=0)
-        if corners == 0:
+        for index in np.flatnonzero(stuck):
+            route, wider = self._routes[index], WIDER**self._detours
+            path_m = guide_path(self._mission, route.start_m, route.target_m, wider)
+            if path_m is not None:
+                self._paths_m[index] = path_m
+            elif self._detours == 0:  # as far as can be told, there is none: no use in being stubborn
+                self._budget = self._budget.settled(self.evaluations)
+        corners = max((len(path_m) for path_m in self._paths_m if path_m is not None), default=0)
+        if not stuck.any() or corners == 0:
             return
-        self._guides = guides(self._mission, self._routes, paths, control_points(self._mission, corners))
+        n_control = control_points(self._mission, corners * (1 + self._detours))
+        self._detours += 1
+        self._guides = guides(self._mission, self._routes, self._paths_m, n_control)
         self._problem = pose(self._mission, self._routes, self._guides, self._care)
         self._swarms = self._swarms.again(self._problem)
         self._present = None
         self._swarms.start()
         self._polish(THOROUGH)
-
-    def _way_around(self, route: Route) -> Array | None:
-        return guide_path(self._mission, route.start_m, route.target_m)
 
     def _look_closer(self) -> None:
         """Mend a breach that the search did not see, and see such ones from now on."""

@@ -11,7 +11,7 @@ import pytest
 from gcs.errors import UsageError
 from gcs.planner import FleetPlan, Limit, Progress, feasibility, plan_mission
 from missions.mission import Mission, load_mission, shipped_missions
-from tests.unit.gcs.planner.worlds import room, wall
+from tests.unit.gcs.planner.worlds import forest, room, wall
 
 QUICKLY = 250
 MAZE = wall(5.0, (11.0, 13.5)) + wall(10.0, (1.5, 4.0)) + wall(15.0, (11.0, 13.5))
@@ -125,6 +125,13 @@ def test_a_maze_is_flown_through_on_a_guide_path():
     assert plan.violations == ()
     for vehicle in plan.vehicles:
         assert 30.0 < vehicle.length_m < 41.0
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_forest_is_flown_through_also_where_the_usual_budget_finds_no_way(seed: int):
+    """With seed 4 the first guide path is a dead end: the search insists, and its second one leads through."""
+    plan = plan_mission(forest(50, seed))
+    assert plan.violations == ()
 
 
 def test_a_vehicle_whose_target_is_where_it_starts_stays_there():

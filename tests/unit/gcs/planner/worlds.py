@@ -1,6 +1,7 @@
 """Missions for the planner's tests: rooms with walls, and one world that has an obstacle of every kind."""
 
 import msgspec
+import numpy as np
 
 from missions.mission import Mission, Target, Vehicle, contradictions, load_mission
 from missions.world import Bounds, Box, Cylinder, Peak, Point3, Threat, World
@@ -37,6 +38,45 @@ def room(
         targets=tuple(Target(name=f"t{i + 1}", position_m=place) for i, place in enumerate(targets_m)),
         allocation=None,
         limits=msgspec.structs.replace(indoor.limits, **changes),
+    )
+    assert not list(contradictions(mission))
+    return mission
+
+
+def forest(count: int, seed: int) -> Mission:
+    """Four vehicles across 30 m of random trunks from floor to ceiling, to permuted targets."""
+    rng, centres = np.random.default_rng(seed), np.empty((0, 2))
+    while len(centres) < count:
+        centre = np.array([rng.uniform(-13.0, 13.0), rng.uniform(-10.0, 10.0)])
+        if np.all(np.linalg.norm(centres - centre, axis=1) > 0.8):
+            centres = np.concatenate((centres, centre[None]))
+    trunks = tuple(
+        Cylinder(name=f"trunk-{i}", centre_m=(east, north), radius_m=float(rng.uniform(0.2, 0.35)), top_m=3.0)
+        for i, (east, north) in enumerate(centres.tolist())
+    )
+    order, norths = rng.permutation(4), (-6.0, -2.0, 2.0, 6.0)
+    world = World(bounds=Bounds(east_m=(-15.0, 15.0), north_m=(-10.5, 10.5), up_m=(0.0, 3.0)), cylinders=trunks)
+    mission = room(
+        pads_m=tuple((1.0, 1.0 + 2.0 * i, 0.0) for i in range(4)),
+        targets_m=tuple((19.0, 1.0 + 2.0 * i, 1.5) for i in range(4)),
+        clearance_m=0.35,
+        separation_m=0.6,
+        avoidance_distance_m=0.4,
+        mean_separation_m=(0.5, 30.0),
+    )
+    mission = msgspec.structs.replace(
+        mission,
+        world=world,
+        vehicles=tuple(
+            msgspec.structs.replace(vehicle, pad_m=(-14.4, north, 0.0))
+            for vehicle, north in zip(mission.vehicles, norths, strict=True)
+        ),
+        targets=tuple(
+            msgspec.structs.replace(target, position_m=(14.4, north, 1.5))
+            for target, north in zip(mission.targets, norths, strict=True)
+        ),
+        allocation={f"v{i + 1}": f"t{order[i] + 1}" for i in range(4)},
+        planner=msgspec.structs.replace(mission.planner, time_slack_s=1.0),
     )
     assert not list(contradictions(mission))
     return mission
