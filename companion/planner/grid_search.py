@@ -44,7 +44,7 @@ def way_around(
     shape = np.maximum(np.floor((high - low) / cell_m).astype(np.int64), 0) + 1
     places = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1).reshape(-1, 3)
     places = np.ascontiguousarray(low + cell_m * places)
-    ends = ends_of(np.asarray(start_m, dtype=float), np.asarray(goal_m, dtype=float), around)
+    ends = ends_of(np.asarray(start_m, dtype=float), np.asarray(goal_m, dtype=float), around, limits)
     speeds = speeds_at(places, CELL_MARGIN * cell_m, limits, around, ends)
     first, last = (_cell_of(end[:3], low, cell_m, shape) for end in ends)
     parents = astar(speeds, shape, cell_m, first, last, limits.avoidance_m_s, limits.cruise_m_s, _climb_sine(limits))

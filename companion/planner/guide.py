@@ -121,7 +121,7 @@ def first_blocked_piece(way: Way, around: Surroundings, limits: FlightLimits) ->
 
 def blocked_samples(points_m: Array, around: Surroundings, limits: FlightLimits) -> npt.NDArray[np.bool_]:
     """(m,) which of (m, 3) points lack clearance, height or flight range, eased near the first and the last one."""
-    ends = ends_of(points_m[0].copy(), points_m[-1].copy(), around)
+    ends = ends_of(points_m[0].copy(), points_m[-1].copy(), around, limits)
     return speeds_at(np.ascontiguousarray(points_m), 0.0, limits, around, ends) == BLOCKED
 
 

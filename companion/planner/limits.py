@@ -99,8 +99,11 @@ def surroundings(mission: Mission, obstacles: Obstacles, zones_m: Array) -> Surr
 
 
 @compiled
-def ends_of(start_m: Array, goal_m: Array, around: Surroundings) -> Array:
-    """(2, 6) the start and the goal of a plan, each (3,) ENU [m], and what they have of all that is required."""
+def ends_of(start_m: Array, goal_m: Array, around: Surroundings, limits: FlightLimits) -> Array:
+    """(2, 6) the start and the goal of a plan, each (3,) ENU [m], and what they have of all that is required.
+
+    A start may be anywhere; a goal counts as having at least what it takes not to touch anything.
+    """
     ends = np.empty((2, 6))
     for axis in range(3):
         ends[0, axis], ends[1, axis] = start_m[axis], goal_m[axis]
@@ -109,6 +112,8 @@ def ends_of(start_m: Array, goal_m: Array, around: Surroundings) -> Array:
         ends[i, END_CLEARANCE] = clearance_at(east, north, up, around.obstacles) - ROUNDING_M
         ends[i, END_HEIGHT] = up - terrain_height_at(east, north, around.obstacles) - ROUNDING_M
         ends[i, END_OUTSIDE] = outside(ends, i, around.room_m) + ROUNDING_M
+    ends[1, END_CLEARANCE] = max(ends[1, END_CLEARANCE], limits.contact_m)
+    ends[1, END_HEIGHT] = max(ends[1, END_HEIGHT], 0.0)
     return ends
 
 
@@ -119,6 +124,7 @@ def lacking(
     """How much each point lacks of the clearance, the height and the flight range that are required of it.
 
     What is required is eased near the ends: who stands too near to a wall may leave along it, instead of freezing.
+    Nobody is eased into touching something, or out of the flight range.
 
     Args:
         points_m: (m, 3 or more) ENU [m]; further columns are not read.
@@ -140,7 +146,8 @@ def lacking(
                 eased_m = EASING * span(east - ends[e, EAST], north - ends[e, NORTH], up - ends[e, UP])
                 clearance_m = min(clearance_m, ends[e, END_CLEARANCE] + eased_m)
                 height_m = min(height_m, ends[e, END_HEIGHT] + eased_m)
-                allowed_m = max(allowed_m, ends[e, END_OUTSIDE] - eased_m)
+                if e == 0:
+                    allowed_m = max(ends[e, END_OUTSIDE] - eased_m, 0.0)
         ground_m = terrain_height_at(east, north, obstacles) if len(obstacles.peaks) > 0 else 0.0
         out[i] = max(clearance_m - free_m[i], 0.0) + max(height_m - (up - ground_m), 0.0)
         out[i] += max(outside(points_m, i, room_m) - allowed_m, 0.0)

@@ -143,7 +143,7 @@ class LocalPlanner:
             start,
             reference,
             self.shape.fit_path @ points_m,
-            ends_of(start[0], points_m[-1], self.around),
+            ends_of(start[0], points_m[-1], self.around, self.limits),
             self.limits,
             self.around,
             self.shape.rows,

@@ -27,7 +27,7 @@ def worst_lack(control: Array, from_segment: float, limits: FlightLimits, around
     for i in range(steps + 1):
         spline_point(control, from_segment + left * i / steps, points[i])
     free_space(points, around.obstacles, free_m)
-    lacking(points, free_m, around, ends_of(points[0], control[-1], around), limits, lacking_m)
+    lacking(points, free_m, around, ends_of(points[0], control[-1], around, limits), limits, lacking_m)
     worst_m = 0.0
     for i in range(steps + 1):
         worst_m = max(worst_m, lacking_m[i])

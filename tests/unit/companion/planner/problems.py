@@ -131,11 +131,12 @@ def lacking_in_numpy(points_m: Array, free_m: Array, problem: LocalProblem) -> A
         within = np.linalg.norm(points_m - np.array(centre_m), axis=1) < radius_m
         required_m[within], height_m[within] = limits.contact_m, 0.0
     allowed_m = np.zeros(len(points_m))
-    for end in ends:
+    for number, end in enumerate(ends):
         eased_m = 0.5 * np.linalg.norm(points_m - end[:3], axis=1)
         required_m = np.minimum(required_m, end[3] + eased_m)
         height_m = np.minimum(height_m, end[4] + eased_m)
-        allowed_m = np.maximum(allowed_m, np.where(end[5] > 2e-6, end[5] - eased_m, 0.0))
+        if number == 0 and end[5] > 2e-6:
+            allowed_m = np.maximum(end[5] - eased_m, 0.0)
     ground_m = obstacles.terrain_height(points_m, around.obstacles)
     outside_m = np.maximum(around.room_m[0] - points_m, points_m - around.room_m[1]).max(axis=1)
     return (
