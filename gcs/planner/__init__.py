@@ -2,15 +2,16 @@
 
 Layers, each importing only what stands below it:
 
-    planner                          plan_mission: the way in
-    search                           swarms, polish and judge in turn
-    allocation, cooperation          who flies where; one swarm per vehicle
-    refinement                       gradient polish
-    assembly, feasibility            the plan that is handed out, and the judge of it
-    timing, track_points, objective  times, track points and eq. 13 of dense curves
-    problem, representation, curves  a mission as numbers, and back
-    fleet_cost, curve_cost, obstacle_gradient    compiled costs with gradients
-    ecpso, plan, limits, budget      the swarm itself; plain data and definitions
+    planner                              plan_mission: the way in
+    search                               swarms, polish and judge in turn
+    allocation, cooperation, guide_path  who flies where; one swarm per vehicle; ways around obstacles
+    assembly                             the plan that is handed out
+    feasibility                          the judge of it
+    timing, track_points, objective      times, track points and eq. 13 of dense curves
+    refinement, lbfgs                    gradient polish
+    problem, representation              a mission as numbers
+    fleet_cost, coupling, curve_cost, obstacle_gradient    compiled costs with gradients
+    ecpso, plan, limits, budget, curves  the swarm itself; plain data, definitions, geometry
 """
 
 from gcs.planner.plan import FleetPlan, Limit, Progress, VehiclePlan, Violation
