@@ -4,6 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
+TEST := $(BIN)/python -m pytest
+SPEED ?= 1
+
 .PHONY: help install demo test test-all check format check-px4 clean
 
 help:  ## this list
@@ -26,6 +29,18 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 
 demo: install  ## fly the paper's indoor mission on the bundled simulator and show it in the browser
 	$(BIN)/gcs fly indoor --sim
+
+test: $(VENV)/.installed-dev  ## all tests but the slow ones: first what runs in one process, then the real programs and the browser
+	$(TEST) -n 2 -m "not slow and not processes and not browser"
+	$(TEST) -m "not slow and (processes or browser)"
+
+test-all: $(VENV)/.installed-dev  ## every test, the slow ones too
+	$(TEST) -n 2 -m "not processes and not browser"
+	$(TEST) -m "processes or browser"
+
+check-px4: install  ## fly the whole sequence on an autopilot that is there: make check-px4 LINK=udpin://0.0.0.0:14550
+	@test -n "$(LINK)" || { echo "usage: make check-px4 LINK=udpin://0.0.0.0:14550 [SPEED=1]"; exit 2; }
+	$(BIN)/gcs fly field --companions --headless --origin here --link $(LINK) --speed $(SPEED) --report out/check-px4
 
 check: $(VENV)/.installed-dev  ## the fast checks: format, lint, types, import contracts
 	$(BIN)/ruff format --check .
