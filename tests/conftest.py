@@ -21,5 +21,5 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    if find_chromium() is None:
+    if find_chromium() is None and not REQUIRED:
         terminalreporter.write_sep("!", f"browser tests were LEFT OUT: {ADVICE}", red=True, bold=True)

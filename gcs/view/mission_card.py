@@ -119,7 +119,7 @@ def _manner(desk: Desk) -> str:
     if desk.flight is None:
         return ""
     speed = desk.flight.speed
-    return desk.flight.mode.value + (f" at {speed:g} × speed" if speed != 1.0 else "")
+    return desk.flight.mode.value + (f" · {speed:g}× time" if speed != 1.0 else "")
 
 
 def _thousands(number: int) -> str:

@@ -21,6 +21,7 @@ POLICY_VIOLATION = 1008
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 
 log = logging.getLogger(__name__)
+logging.getLogger("websockets").addHandler(logging.NullHandler())  # a broken connection is nothing for a terminal
 
 
 async def serve_page(desk: Desk, host: str, port: int, first_client: asyncio.Event | None = None) -> None:
@@ -96,9 +97,10 @@ def is_own_page(origin: str | None) -> bool:
 
 def _refuse_foreign_page(server: viser.ViserServer, client_id: int) -> None:
     """Close a foreign page's connection: browsers let any site connect to loopback, and what it presses flies."""
-    connection = server._websock_server._live_connections[client_id]
-    request = connection.request
-    origin = request.headers.get("Origin") if request is not None else None
+    connection = server._websock_server._live_connections.get(client_id)
+    if connection is None or connection.request is None:
+        return
+    origin = connection.request.headers.get("Origin")
     if not is_own_page(origin):
         log.warning("refused a connection from a page of %s", origin)
         closing = connection.close(POLICY_VIOLATION, "foreign origin")

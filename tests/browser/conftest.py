@@ -7,18 +7,18 @@ from typing import Protocol
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, Page, async_playwright
+from playwright.async_api import Browser, Page, async_playwright, expect
 
 from gcs.view.server import serve_page
 from tests.browser.chromium import ARGUMENTS, find_chromium
+from tests.browser.loopback import HOST, PATIENCE_S, free_port
 from tests.browser.scripted_desk import ScriptedDesk
-from tests.unit.gcs.view.test_server import HOST, free_port
 
 SMALL, LARGE = (960, 640), (1360, 800)
 """Windows: what is drawn in software is better small, what is looked at better large."""
 
-PATIENCE_MS = 60_000
-"""A page drawn in software on a busy machine comes slowly."""
+
+expect.set_options(timeout=PATIENCE_S * 1000)
 
 
 class OpenPage(Protocol):
@@ -70,7 +70,7 @@ async def serving(scripted: ScriptedDesk) -> AsyncIterator[int]:
 async def tab(browser: Browser, port: int, window: tuple[int, int] = SMALL) -> AsyncIterator[Page]:
     """A tab that shows the page on a port, once its panels are there."""
     page = await browser.new_page(viewport={"width": window[0], "height": window[1]})
-    page.set_default_timeout(PATIENCE_MS)
+    page.set_default_timeout(PATIENCE_S * 1000)
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     try:

@@ -142,7 +142,7 @@ class ScriptedVehicle:
 class Air:
     """The connection between the station and all scripted vehicles."""
 
-    peer = None
+    peer: tuple[str, int] | None = None
 
     def __init__(self) -> None:
         self.vehicles: list[ScriptedVehicle] = []

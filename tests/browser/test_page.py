@@ -1,53 +1,23 @@
 """The web page in a real browser: what an operator sees, and what comes of pressing."""
 
-import asyncio
 import re
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.async_api import Page, expect
-from viser import transforms
+from playwright.async_api import expect
 
 from gcs.dialect import Mode, mavlink
 from gcs.flight.events import Severity
 from gcs.flight.monitor import Phase
-from tests.browser.conftest import LARGE, PATIENCE_MS, OpenPage
+from tests.browser.conftest import LARGE, OpenPage
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
+from tests.browser.watching import OUT, button, camera_position_m, pixels, row, scene, until
 
 pytestmark = pytest.mark.browser
 
-OUT = Path(__file__).parents[2] / "out"
-"""Screenshots for people to look at."""
-
 HOLD = (mavlink.MAV_CMD_DO_SET_MODE, float(Mode.HOLD.main), float(Mode.HOLD.sub))
 LAND = (mavlink.MAV_CMD_DO_SET_MODE, float(Mode.LAND.main), float(Mode.LAND.sub))
-
-expect.set_options(timeout=PATIENCE_MS)
-
-
-def button(page: Page, name: str):
-    return page.get_by_role("button", name=name, exact=True)
-
-
-def row(page: Page, vehicle: str):
-    return page.locator(".gcs-fleet tbody tr", has_text=vehicle)
-
-
-async def until(condition: Callable[[], bool], what: str) -> None:
-    """Wait for something on the ground station's side."""
-    for _ in range(PATIENCE_MS // 50):
-        if condition():
-            return
-        await asyncio.sleep(0.05)
-    pytest.fail(f"waited in vain until {what}")
-
-
-async def scene(page: Page) -> set[str]:
-    """Names of what is in the browser's scene."""
-    return set(await page.evaluate("Object.keys(window.__viserSceneTree.getState())"))
 
 
 async def flying(mission: str, share: float = 0.4) -> ScriptedDesk:
@@ -164,13 +134,6 @@ async def test_without_a_mission_vehicles_are_watched_and_commanded(open_page: O
     assert scripted.vehicles[1].commands == []  # it stands on the ground
 
 
-async def camera_position_m(page: Page) -> np.ndarray:
-    """Of the browser's camera, in ENU."""
-    w, x, y, z = await page.evaluate("window.__viserSceneTree.getState()[''].wxyz")
-    place = await page.evaluate("window.__viserMutable.camera.position.toArray()")
-    return transforms.SO3(np.array([w, x, y, z])).inverse() @ np.array(place)
-
-
 async def test_cameras_see_the_whole_world_look_from_above_and_follow(open_page: OpenPage):
     scripted = await flying("indoor", share=0.2)
     page = await open_page(scripted)
@@ -197,7 +160,13 @@ async def test_cameras_see_the_whole_world_look_from_above_and_follow(open_page:
 
 
 @pytest.mark.parametrize(
-    ("mission", "vehicles"), [("field", 1), ("indoor-unmapped", 2), ("fleet-10", 10), ("terrain-1-5uav", 5)]
+    ("mission", "vehicles"),
+    [
+        pytest.param("field", 1, marks=pytest.mark.slow),
+        pytest.param("indoor-unmapped", 2, marks=pytest.mark.slow),
+        ("fleet-10", 10),
+        ("terrain-1-5uav", 5),
+    ],
 )
 async def test_every_world_is_drawn(open_page: OpenPage, mission: str, vehicles: int):
     page = await open_page(await flying(mission), LARGE)
@@ -211,18 +180,3 @@ async def test_every_world_is_drawn(open_page: OpenPage, mission: str, vehicles:
     drawn = shown[shown[:, 3] > 0]
     assert len(drawn) > 0.1 * len(shown), "most of the picture is empty"
     assert len(np.unique(drawn // 16, axis=0)) > 60, "the picture has hardly any colours"
-
-
-async def pixels(page: Page) -> bytes:
-    """What the browser's canvas shows, RGBA."""
-    values = await page.evaluate(
-        """() => {
-            const canvas = document.querySelector("canvas[data-engine]");
-            const copy = document.createElement("canvas");
-            copy.width = 320; copy.height = 200;
-            const context = copy.getContext("2d");
-            context.drawImage(canvas, 0, 0, 320, 200);
-            return Array.from(context.getImageData(0, 0, 320, 200).data);
-        }"""
-    )
-    return bytes(values)

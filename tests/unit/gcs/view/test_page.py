@@ -14,8 +14,8 @@ from gcs.view.lines import AHEAD, CHUNK
 from gcs.view.page import Page
 from gcs.view.server import close_server, open_server
 from missions.tunnel import CompanionState
+from tests.browser.loopback import HOST, free_port
 from tests.browser.scripted_desk import ScriptedDesk
-from tests.unit.gcs.view.test_server import HOST, free_port
 
 
 @pytest.fixture

@@ -14,28 +14,16 @@ from gcs.errors import UsageError
 from gcs.flight.events import Severity
 from gcs.view import server
 from gcs.view.page import Page
+from tests.browser.loopback import HOST, answering, free_port
 from tests.unit.gcs.view.desks import make_desk
 
-HOST = "127.0.0.1"
 VISER = [Subprotocol(f"viser-v{viser.__version__}")]
-
-
-def free_port() -> int:
-    with socket.create_server((HOST, 0)) as listener:
-        return listener.getsockname()[1]
 
 
 async def served(desk: Desk, port: int) -> asyncio.Task[None]:
     """The page, once it answers."""
     task = asyncio.create_task(server.serve_page(desk, HOST, port))
-    while not task.done():
-        try:
-            _, writer = await asyncio.open_connection(HOST, port)
-        except OSError:
-            await asyncio.sleep(0.01)
-        else:
-            writer.close()
-            break
+    await answering(port)
     return task
 
 
@@ -61,6 +49,16 @@ async def test_a_port_in_use_is_refused_by_name_and_no_other_one_is_taken():
         port = listener.getsockname()[1]
         with pytest.raises(UsageError, match=f"--port {port}.*in use"):
             await server.serve_page(await make_desk(), HOST, port)
+
+
+async def test_a_port_that_is_taken_at_the_last_moment_is_noticed_too(monkeypatch):
+    monkeypatch.setattr(server, "_check_free", lambda host, port: None)
+    threads = threading.active_count()
+    with socket.create_server((HOST, 0)) as listener:
+        port = listener.getsockname()[1]
+        with pytest.raises(UsageError, match=f"--port {port}.*in use"):
+            server.open_server(HOST, port)
+    assert threading.active_count() == threads
 
 
 async def test_two_pages_on_one_port_are_one_too_many():
@@ -94,7 +92,8 @@ async def test_a_foreign_web_page_is_cut_off_and_our_own_is_served():
     async with connect(f"ws://{HOST}:{port}", subprotocols=VISER, origin=Origin(f"http://{HOST}:{port}")) as own:
         assert len(await own.recv()) > 0
     async with connect(f"ws://{HOST}:{port}", subprotocols=VISER, origin=Origin("https://example.org")) as foreign:
-        await foreign.wait_closed()
+        async with asyncio.timeout(10.0):
+            await foreign.wait_closed()
         assert foreign.close_code == server.POLICY_VIOLATION
     await ended(task)
 
@@ -112,7 +111,8 @@ async def test_a_page_that_cannot_be_drawn_says_so_once_and_goes_on(monkeypatch)
     monkeypatch.setattr(server, "UPDATE_INTERVAL_S", 0.001)
     desk = await make_desk()
     task = await served(desk, free_port())
-    await enough.wait()
+    async with asyncio.timeout(10.0):
+        await enough.wait()
     await ended(task)
     complaints = [event.text for event in desk.events.events if event.severity is Severity.ERROR]
     assert complaints == ["the page could not be updated: ZeroDivisionError('nothing to divide by')"]

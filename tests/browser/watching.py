@@ -1,0 +1,61 @@
+"""What tests look for on the page, and press."""
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.async_api import Locator, Page
+from viser import transforms
+
+from tests.browser.loopback import PATIENCE_S
+
+OUT = Path(__file__).parents[2] / "out"
+"""Screenshots for people to look at."""
+
+POLL_S = 0.05
+
+
+def button(page: Page, name: str) -> Locator:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def row(page: Page, vehicle: str) -> Locator:
+    return page.locator(".gcs-fleet tbody tr", has_text=vehicle)
+
+
+async def until(condition: Callable[[], bool], what: str) -> None:
+    """Wait for something on the ground station's side."""
+    for _ in range(round(PATIENCE_S / POLL_S)):
+        if condition():
+            return
+        await asyncio.sleep(POLL_S)
+    pytest.fail(f"waited in vain until {what}")
+
+
+async def scene(page: Page) -> set[str]:
+    """Names of what is in the browser's scene."""
+    return set(await page.evaluate("Object.keys(window.__viserSceneTree.getState())"))
+
+
+async def camera_position_m(page: Page) -> np.ndarray:
+    """Of the browser's camera, in ENU."""
+    w, x, y, z = await page.evaluate("window.__viserSceneTree.getState()[''].wxyz")
+    place = await page.evaluate("window.__viserMutable.camera.position.toArray()")
+    return transforms.SO3(np.array([w, x, y, z])).inverse() @ np.array(place)
+
+
+async def pixels(page: Page) -> bytes:
+    """What the browser's canvas shows, RGBA."""
+    values = await page.evaluate(
+        """() => {
+            const canvas = document.querySelector("canvas[data-engine]");
+            const copy = document.createElement("canvas");
+            copy.width = 320; copy.height = 200;
+            const context = copy.getContext("2d");
+            context.drawImage(canvas, 0, 0, 320, 200);
+            return Array.from(context.getImageData(0, 0, 320, 200).data);
+        }"""
+    )
+    return bytes(values)
