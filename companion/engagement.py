@@ -22,7 +22,7 @@ class Engagement:
         crew: planner and settings.
         order: what is to be flown.
         current_seq: the mission item that is flown to.
-        mode_before: the autopilot's mode at the start; any other but OFFBOARD means that somebody else took over.
+        mode_before: the autopilot's mode at the start; but for a take-off that ends, only OFFBOARD may follow.
         now_s: vehicle time of the start.
     """
 

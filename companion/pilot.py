@@ -329,7 +329,9 @@ class Pilot:
     def _mode_while_engaging(self, engagement: Engagement, now_s: float) -> Iterator[Instruction]:
         if self._mode is FlightMode.OFFBOARD and engagement.plan is not None and self._leaving is None:
             yield from self._begin_flight(engagement, engagement.plan, now_s)
-        elif self._mode not in {engagement.mode_before, FlightMode.OFFBOARD}:
+        elif (engagement.mode_before, self._mode) == (FlightMode.TAKEOFF, FlightMode.HOLD):
+            engagement.mode_before = self._mode  # the take-off has come to its end
+        else:
             yield from self._release(now_s)
 
     def _begin_flight(self, engagement: Engagement, plan: Plan, now_s: float) -> Iterator[Instruction]:
@@ -352,7 +354,8 @@ class Pilot:
             yield instructions.Note("mode refused", {"mode": event.mode.value})
             if self._engagement is not None and event.mode is FlightMode.OFFBOARD and self._leaving is None:
                 yield from self._retreat(Reason.OFFBOARD_REFUSED)
-        elif event.mode is self._mode:  # it was in that mode before: no change of mode will be reported
+        elif event.mode is self._mode and event.mode in {self._leaving, FlightMode.OFFBOARD}:
+            # it was in that mode before, so that no change of mode will be reported
             yield from self._in_mode(now_s)
 
     # -------------------------------------------------------------------- flying

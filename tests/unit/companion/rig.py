@@ -1,7 +1,7 @@
 """A pilot on a bench: events are fed by hand, instructions are kept, and a planner answers with straight lines."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
@@ -75,9 +75,10 @@ class Rig:
     answers_plans: bool = True
     follows: bool = True
     """The vehicle does what its setpoints say."""
+    planner: Any = None
 
     def __post_init__(self) -> None:
-        self.planner = StraightPlanner()
+        self.planner = self.planner or StraightPlanner()
         self.pilot = Pilot(self.mission, CompanionSettings(vehicle=1, system_url="", mode=self.mode), self.planner)
         self.frame = AutopilotFrame(HOME, self.mission.frame, HOME.altitude_amsl_m - INDOOR.origin.altitude_amsl_m)
         self.place_ned_m = self.frame.ned(START_M)
@@ -178,6 +179,3 @@ def with_home(altitude_m: float) -> events.HomeReported:
     return events.HomeReported(
         GeodeticPoint(latitude_deg=HOME.latitude_deg, longitude_deg=HOME.longitude_deg, altitude_amsl_m=altitude_m)
     )
-
-
-__all__ = ["replace"]

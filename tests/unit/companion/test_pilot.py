@@ -201,6 +201,15 @@ def test_a_mode_taken_while_engaging_ends_control():
     assert rig.pilot.state is State.RELEASED
 
 
+def test_a_take_off_may_end_while_engaging():
+    rig = Rig(follows=False).airborne()
+    rig.feed(events.ModeReported(FlightMode.TAKEOFF))
+    rig.velocity_ned_m_s = np.array([0.0, 0.0, -1.0])
+    rig.start()
+    rig.feed(events.ModeReported(FlightMode.HOLD))
+    assert rig.pilot.state is State.ENGAGING
+
+
 def test_a_copy_of_the_start_that_was_on_its_way_does_not_take_control_back():
     rig = Rig().flying()
     rig.feed(events.ModeReported(FlightMode.HOLD))
