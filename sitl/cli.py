@@ -17,8 +17,9 @@ from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
 from sitl.dynamics.airframe import AirframeName
 from sitl.errors import BadPlace, SitlError
+from sitl.open_field import open_field
 from sitl.service import serve
-from sitl.settings import HIGHEST_INSTANCE_BASE, SIH_HOME, Settings, open_field
+from sitl.settings import HIGHEST_INSTANCE_BASE, Settings
 from sitl.simulator import Simulator
 
 BAD_USAGE = 2
@@ -91,7 +92,7 @@ def _mission(name: str | None, n_vehicles: int | None, origin: str | None) -> Mi
         MissionError: the file cannot be used.
         BadPlace: the origin is no place.
     """
-    mission = load_mission(name) if name is not None else open_field(n_vehicles or 1, SIH_HOME)
+    mission = load_mission(name) if name is not None else open_field(n_vehicles or 1)
     return mission if origin is None else mission.moved_to(_place(origin))
 
 

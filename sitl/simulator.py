@@ -15,6 +15,7 @@ from sitl.dynamics.state import Crash
 from sitl.fleet import TICK_S, Fleet
 from sitl.link.ground_link import Direction, GroundLink
 from sitl.microservices.outbox import Link
+from sitl.open_field import open_field
 from sitl.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
@@ -60,7 +61,7 @@ class Simulator:
     """All vehicles of a mission, advanced tick by tick of 20 ms.
 
     Args:
-        mission: the vehicles and the world that they are in.
+        mission: the vehicles and the world that they are in, or how many vehicles to put on open ground.
         seed: of everything random.
         speed: simulated seconds per wall-clock second, as far as the vehicles' timeouts must know.
         airframe: the body of every vehicle.
@@ -76,13 +77,14 @@ class Simulator:
 
     def __init__(
         self,
-        mission: Mission,
+        mission: Mission | int,
         *,
         seed: int,
         speed: float = 1.0,
         airframe: Airframe = X500_LIKE,
         utc_start_us: int = UTC_START_US,
     ) -> None:
+        mission = open_field(mission) if isinstance(mission, int) else mission
         self.mission = mission
         physics_rng, *link_rngs = (
             np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(1 + len(mission.vehicles))

@@ -18,7 +18,7 @@ from missions.mission import Mission, Positioning, Simulation
 from sitl.dialect import Message, mavlink
 from sitl.dynamics.airframe import SIH, Airframe
 from sitl.microservices.outbox import Link
-from sitl.settings import open_field
+from sitl.open_field import open_field
 from sitl.simulator import Simulator
 
 Array = npt.NDArray[np.float64]

@@ -66,7 +66,7 @@ class Vehicle:
         self.autopilot = Autopilot(
             FlightControl(body, gains),
             _own_frame(body),
-            parameter_table(airframe, sysid),
+            parameter_table(airframe),
             speed,
             self._texts.say,
             self._progress.reached,

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+from missions.mission_items import MissionItem
 from sitl.autopilot.craft import Craft
 from sitl.autopilot.flight_modes import Descend, FlightMode, Hold, Land, Return, Takeoff
 from sitl.autopilot.geofence import Geofence
@@ -10,7 +11,7 @@ from sitl.autopilot.mission_flight import MissionFlight, Outcome
 from sitl.autopilot.modes import Mode
 from sitl.autopilot.offboard import Offboard
 from sitl.autopilot.places import LocalPoint
-from sitl.autopilot.plan import Cmd, Plan
+from sitl.autopilot.plan import PLACES, Cmd, Plan, latitude_deg, longitude_deg
 from sitl.autopilot.reports import Severity
 from sitl.snapshot import Snapshot
 
@@ -60,9 +61,19 @@ class Navigator:
         outside = self._fence.first_outside(items)
         if outside is not None:
             return f"Geofence violation for waypoint {outside + 1}"
+        first = next((item for item in items if item.command in PLACES), None)
+        if first is not None and self._is_too_far(first):
+            return "First waypoint too far away"
         if all(item.command in (Cmd.DO_CHANGE_SPEED, Cmd.DO_JUMP) for item in items):
             return "Mission has nothing to fly"
         return None
+
+    def _is_too_far(self, first: MissionItem) -> bool:
+        """Farther from home than MIS_DIST_1WP; 0 is no limit."""
+        craft = self._craft
+        place = craft.frame.local(latitude_deg(first), longitude_deg(first), 0.0)
+        away_m = math.hypot(place.x_m - craft.home.x_m, place.y_m - craft.home.y_m)
+        return 0.0 < craft.parameters["MIS_DIST_1WP"] < away_m
 
     # ------------------------------------------------------------------- tick
     def stop(self) -> None:

@@ -40,11 +40,9 @@ _POSITION = (
 
 _GUIDANCE = (
     Parameter("MPC_ACC_HOR", 3.0, 0.1, 15.0),
-    Parameter("MPC_ACC_HOR_MAX", 5.0, 0.1, 15.0),
     Parameter("MPC_ACC_UP_MAX", 4.0, 0.1, 15.0),
     Parameter("MPC_ACC_DOWN_MAX", 3.0, 0.1, 15.0),
     Parameter("MPC_JERK_AUTO", 4.0, 1.0, 80.0),
-    Parameter("MPC_JERK_MAX", 8.0, 0.5, 500.0),
     Parameter("MPC_XY_CRUISE", 5.0, 0.1, 20.0),
     Parameter("MPC_Z_V_AUTO_UP", 3.0, 0.1, 8.0),
     Parameter("MPC_Z_V_AUTO_DN", 1.5, 0.1, 4.0),
@@ -53,7 +51,6 @@ _GUIDANCE = (
     Parameter("MPC_YAWRAUTO_MAX", 45.0, 1.0, 360.0),
     Parameter("NAV_ACC_RAD", 2.0, 0.05, 200.0),
     Parameter("NAV_MC_ALT_RAD", 0.8, 0.05, 200.0),
-    Parameter("NAV_LOITER_RAD", 80.0, 25.0, 1000.0),
 )
 
 _TAKEOFF_AND_LANDING = (
@@ -71,7 +68,6 @@ _TAKEOFF_AND_LANDING = (
     Parameter("LNDMC_TRIG_TIME", 1.0, 0.1, 10.0),
     Parameter("MIS_TAKEOFF_ALT", 2.5, 0.5, 80.0),
     Parameter("MIS_DIST_1WP", 10000.0, 0.0, 1e6),
-    Parameter("MIS_TKO_LAND_REQ", 0, 0, 5),
     Parameter("MIS_YAW_ERR", 12.0, 1.0, 90.0),
     Parameter("COM_DISARM_LAND", 2.0, -1.0, 1000.0),
     Parameter("COM_DISARM_PRFLT", 10.0, -1.0, 1000.0),
@@ -125,10 +121,9 @@ _SAFETY = (
 )
 
 
-def parameter_table(airframe: Airframe, sysid: int) -> tuple[Parameter, ...]:
+def parameter_table(airframe: Airframe) -> tuple[Parameter, ...]:
     """All parameters of one vehicle, sorted by name as their indices count."""
     own = (
-        Parameter("MAV_SYS_ID", sysid, 1, 250),
         Parameter("MPC_THR_HOVER", round(airframe.hover_thrust, 3), 0.1, 0.8),
         Parameter("THR_MDL_FAC", airframe.thrust_curve, airframe.thrust_curve, airframe.thrust_curve),
     )

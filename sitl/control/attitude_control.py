@@ -76,17 +76,17 @@ def mix(v: Any, roll: float, pitch: float, yaw: float, thrust: float) -> None:
     motor[1] = thrust + across - along
     motor[2] = thrust + across + along
     motor[3] = thrust - across - along
-    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, True)
-    _desaturate(motor, -HALF_SQRT2, HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2)
-    _desaturate(motor, HALF_SQRT2, -HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2)
+    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
+    _desaturate(motor, -HALF_SQRT2, HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2, 1.0, 1.0)
+    _desaturate(motor, HALF_SQRT2, -HALF_SQRT2, HALF_SQRT2, -HALF_SQRT2, 1.0, 1.0)
     before = HALF_SQRT2 * 0.5 * (-motor[0] + motor[1] + motor[2] - motor[3])
     before_pitch = HALF_SQRT2 * 0.5 * (motor[0] - motor[1] + motor[2] - motor[3])
     motor[0] += yaw
     motor[1] += yaw
     motor[2] -= yaw
     motor[3] -= yaw
-    _desaturate(motor, 1.0, 1.0, -1.0, -1.0, False, 1.0 + YAW_THRUST_MARGIN)
-    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, True)
+    _desaturate(motor, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0 + YAW_THRUST_MARGIN)
+    _desaturate(motor, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
     given_yaw = 0.25 * (motor[0] + motor[1] - motor[2] - motor[3])
     v.saturated[0] = _sign(roll - before)
     v.saturated[1] = _sign(pitch - before_pitch)
@@ -135,15 +135,13 @@ def _rate_pid(v: Any, k: int, p: float, i: float, d: float, limit: float, dt_s: 
 
 
 @compiled
-def _desaturate(
-    motor: Any, d0: float, d1: float, d2: float, d3: float, only_down: bool = False, top: float = 1.0
-) -> None:
+def _desaturate(motor: Any, d0: float, d1: float, d2: float, d3: float, upwards: float, top: float) -> None:
     """Move the motors along a direction until none is outside [0, top], or the excess is the same on both sides.
 
     Args:
         motor: (4,) thrusts, changed in place.
         d0, d1, d2, d3: the direction.
-        only_down: do not move along the direction, only against it.
+        upwards: 1 to allow moves along the direction, 0 for moves against it alone.
         top: the highest thrust of a motor.
     """
     direction = (d0, d1, d2, d3)
@@ -154,8 +152,7 @@ def _desaturate(
             move = excess / direction[k]
             lowest, highest = min(lowest, move), max(highest, move)
         move = share * (lowest + highest)
-        if only_down and move > 0.0:
-            return
+        move = min(move, upwards * abs(move))
         for k in range(4):
             motor[k] += move * direction[k]
 

@@ -1,6 +1,5 @@
 """Airframes as parameter sets: every value with its unit and its source."""
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -92,11 +91,3 @@ class AirframeName(Enum):
     @property
     def airframe(self) -> Airframe:
         return X500_LIKE if self is AirframeName.X500_LIKE else SIH
-
-
-def signal_for_thrust(thrust: float, curve: float) -> float:
-    """The rotor signal in [0, 1] that yields a share of full thrust: the inverse of `Airframe.thrust_curve`."""
-    if curve <= 0.0:
-        return thrust
-    linear = (1.0 - curve) / (2.0 * curve)
-    return -linear + math.sqrt(linear * linear + thrust / curve)

@@ -1,4 +1,4 @@
-"""A quadrotor as a rigid body (equations MR-1 to MR-5, docs/maths/multirotor.md), semi-implicit Euler steps.
+"""A quadrotor as a rigid body (equations MR-1 to MR-5), in semi-implicit Euler steps.
 
 MR-1  thrust of a rotor    T_i = T_max (c s_i^2 + (1 - c) s_i),  s_i' = (u_i - s_i) / tau
 MR-2  force                F = R [0, 0, -sum T_i] - k_d (v - wind),  v' = g + F / m

@@ -13,7 +13,7 @@ from missions.world import World
 from sitl.dialect import mavlink
 from sitl.dynamics.airframe import X500_LIKE, Airframe
 from sitl.microservices.outbox import Link
-from sitl.settings import open_field
+from sitl.open_field import open_field
 from sitl.simulator import Simulator
 from sitl.wire import LAYOUTS
 

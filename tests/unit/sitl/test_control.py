@@ -19,7 +19,7 @@ NAN = math.nan
 
 def default_gains() -> np.ndarray:
     gains = np.zeros(1, dtype=GAINS)
-    for parameter in parameter_table(SIH, 1):
+    for parameter in parameter_table(SIH):
         if parameter.name in GAINS.names:
             gains[parameter.name] = parameter.default
     return gains

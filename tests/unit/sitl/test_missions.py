@@ -220,3 +220,10 @@ def test_a_finished_mission_starts_over_after_landing():
         flown.run(3.0)
         flown.until(lambda: not flown.armed, 60.0)
     assert flown.texts.count("Mission finished, landed") == 2
+
+
+def test_a_mission_whose_first_waypoint_is_far_away_is_not_flown():
+    flown = Flown().boot()
+    assert flown.upload([waypoint(10_500.0, 0.0, 50.0)]) == ACCEPTED
+    assert flown.texts == ["First waypoint too far away"]
+    assert flown.command(300) == DENIED

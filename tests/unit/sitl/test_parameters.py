@@ -109,11 +109,11 @@ def test_the_hash_changes_with_a_value_and_only_then():
 
 def test_every_gain_of_the_control_is_a_parameter():
     for airframe in (X500_LIKE, SIH):
-        assert set(GAINS.names) <= {parameter.name for parameter in parameter_table(airframe, 1)}
+        assert set(GAINS.names) <= {parameter.name for parameter in parameter_table(airframe)}
 
 
 def test_defaults_are_within_what_is_applied():
-    for parameter in parameter_table(X500_LIKE, 3):
+    for parameter in parameter_table(X500_LIKE):
         assert parameter.low <= parameter.default <= parameter.high, parameter.name
 
 
@@ -134,7 +134,7 @@ def test_no_value_stops_the_simulator(extreme):
 
 def test_loss_timeouts_are_shown_as_set_and_applied_in_simulated_time():
     applied = {}
-    parameters = Parameters(parameter_table(X500_LIKE, 1), 5.0, applied.__setitem__)
+    parameters = Parameters(parameter_table(X500_LIKE), 5.0, applied.__setitem__)
     assert parameters.stored("COM_OF_LOSS_T") == 1.0
     assert parameters["COM_OF_LOSS_T"] == applied["COM_OF_LOSS_T"] == 5.0
     assert parameters["COM_DISARM_LAND"] == 2.0

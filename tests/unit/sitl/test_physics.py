@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sitl.dynamics.airframe import GRAVITY_M_S2, SIH, X500_LIKE, Airframe, signal_for_thrust
+from sitl.control.attitude_control import signal_for_thrust
+from sitl.dynamics.airframe import GRAVITY_M_S2, SIH, X500_LIKE, Airframe
 from sitl.dynamics.rigid_body import move
 from sitl.dynamics.state import new_fleet
 

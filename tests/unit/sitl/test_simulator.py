@@ -12,7 +12,6 @@ from sitl.dynamics.airframe import X500_LIKE
 from sitl.fleet import TICK_S, Fleet
 from sitl.link.truth_log import HEADER, TruthLog
 from sitl.microservices.outbox import Link
-from sitl.settings import open_field
 from sitl.simulator import Simulator
 from tests.unit.sitl.flown import NAN, Flown, field
 
@@ -112,7 +111,7 @@ def test_wind_and_gusts_push_and_are_flown_against():
 
 
 def test_the_truth_log_has_its_header_all_vehicles_and_the_missions_frame(tmp_path):
-    simulator = Simulator(open_field(2), seed=1)
+    simulator = Simulator(2, seed=1)
     path = tmp_path / "truth.csv"
     with TruthLog(path) as log:
         for _ in range(10):
