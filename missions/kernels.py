@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import config, njit
-from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
+from numba.core.caching import InTreeCacheLocator, UserProvidedCacheLocator, UserWideCacheLocator
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -83,6 +83,10 @@ class _StampedWithImports:
         return _stamp(self._py_file)
 
 
+class KernelsWhereOrdered(_StampedWithImports, UserProvidedCacheLocator):
+    """In $NUMBA_CACHE_DIR, if that is set."""
+
+
 class KernelsBesideSource(_StampedWithImports, InTreeCacheLocator):
     """In `__pycache__`, where that can be written."""
 
@@ -91,7 +95,7 @@ class KernelsOfUser(_StampedWithImports, UserWideCacheLocator):
     """In the user's cache directory otherwise."""
 
 
-_LOCATORS = (KernelsBesideSource, KernelsOfUser)
+_LOCATORS = (KernelsWhereOrdered, KernelsBesideSource, KernelsOfUser)
 config.CACHE_LOCATOR_CLASSES = ",".join(  # pyright: ignore[reportAttributeAccessIssue]
     f"{__name__}.{locator.__name__}" for locator in _LOCATORS
 )
