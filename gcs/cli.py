@@ -117,8 +117,8 @@ def plan(
 
         gcs plan terrain-1-5uav --seed 3 --output plan.json
     """
-    if output is not None and output.suffix != ".json":
-        raise UsageError(f"--output {output}: expected a name that ends in .json")
+    if output is not None:
+        _check_output(output)
     from rich.console import Console
 
     from gcs.console import PlanConsole, print_plan
@@ -279,6 +279,14 @@ def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
         return msgspec.convert(fields, GeodeticPoint)
     except (ValueError, msgspec.ValidationError) as problem:
         raise UsageError(f"--origin {text}: expected LAT,LON,ALT or `here`: {problem}") from None
+
+
+def _check_output(path: Path) -> None:
+    """Refuse what cannot be written before anything is worked out."""
+    if path.suffix != ".json":
+        raise UsageError(f"--output {path}: expected a name that ends in .json")
+    if not path.parent.is_dir():
+        raise UsageError(f"--output {path}: cannot be written: {path.parent} is no directory")
 
 
 def _write(path: Path, text: str) -> None:

@@ -30,11 +30,11 @@ class FlightConsole:
 
 
 class PlanConsole:
-    """A progress bar for the planner; on no terminal, a line at each tenth of the work."""
+    """A progress bar for the planner; on no terminal, a line at each quarter of the work."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._last_tenth = -1
+        self._last_quarter = 0
         columns = (
             TextColumn("planning"),
             BarColumn(),
@@ -49,10 +49,10 @@ class PlanConsole:
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=progress.share_done, best=best)
             return
-        tenth = int(progress.share_done * 10)
-        if tenth > self._last_tenth:
-            self._last_tenth = tenth
-            self._console.print(f"planning {tenth * 10:3d} %, best {best}", markup=False)
+        quarter = int(progress.share_done * 4)
+        if quarter > self._last_quarter:
+            self._last_quarter = quarter
+            self._console.print(f"planning {quarter * 25:3d} %, best {best}", markup=False)
 
     def __enter__(self) -> "PlanConsole":
         if self._bar is not None:
