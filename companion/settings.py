@@ -58,7 +58,7 @@ class PilotSettings:
     """When the pilot does what; vehicle time unless said."""
 
     tick_s: float = 0.02
-    status_interval_s: float = 0.5
+    status_interval_s: float = 0.2
     replan_age_s: float = 1.0
     """A committed trajectory is replaced when it is this old."""
     retry_s: float = 0.3

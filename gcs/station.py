@@ -70,6 +70,8 @@ class Station:
                 self.recording.write(message.get_msgbuf(), self.unix_us())
             self._routes[source[0]] = (connection, address)
             self.fleet.fold(message, now_s)
+            if not self._is_for_us(message):
+                continue
             for inbox in self._inboxes.get(source, ()):
                 if message.get_type() in inbox.wants:
                     inbox.queue.put_nowait(message)
@@ -143,6 +145,12 @@ class Station:
     def now_s(self) -> float:
         """The running event loop's monotonic clock [s]."""
         return asyncio.get_running_loop().time()
+
+    def _is_for_us(self, message: Message) -> bool:
+        """Routers carry also what is meant for companions and other ground stations: it answers nothing of ours."""
+        ours = (self.codec.system, self.codec.component)
+        targets = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
+        return all(target in {0, our} for target, our in zip(targets, ours, strict=True))
 
     def _send_all(self, messages: Iterable[Message], sysid: int) -> None:
         for message in messages:

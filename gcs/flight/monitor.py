@@ -163,7 +163,7 @@ class VehicleMonitor:
     def _holds_at_target(self, state: VehicleState) -> bool:
         if self.on_arrival is not OnArrival.HOLD or self.distance_to_target_m(state) > self.tolerance_m:
             return False
-        if not self.flown_by_companion:
+        if state.mode is not Mode.HOLD or not self.flown_by_companion:
             return state.mode is Mode.HOLD
         status = state.companion.status
         return status is not None and (status.state, status.reason) == (CompanionState.HOLDING, Reason.TARGET_REACHED)

@@ -33,15 +33,17 @@ class Backoff:
     """When to ask again: after `first_s`, then each time half as long again, at most `attempts` times."""
 
     def __init__(self, first_s: float, attempts: int, longest_s: float = 3.0) -> None:
-        self._next_s, self._longest_s, self._left = first_s, longest_s, attempts
+        self._next_s, self._longest_s, self._attempts = first_s, longest_s, attempts
+        self.taken = 0
+        """Attempts used."""
 
     @property
     def exhausted(self) -> bool:
-        return self._left <= 0
+        return self.taken >= self._attempts
 
     def take(self) -> float:
         """Use one attempt; how long [s] to wait for its answer."""
         wait_s = self._next_s
-        self._left -= 1
+        self.taken += 1
         self._next_s = min(1.5 * self._next_s, self._longest_s)
         return wait_s

@@ -14,7 +14,13 @@ from gcs.microservices import Backoff
 from missions.mission_items import MissionItem
 
 FIRST_TIMEOUT_S = 0.7
-ATTEMPTS = 8
+LONGEST_TIMEOUT_S = 1.0
+ATTEMPTS = 20
+BEGIN_AGAIN_AFTER = 6
+"""Unanswered attempts, 5.7 s, after which a transfer is begun anew: a PX4 forgets one after 5 s of silence, and then
+says nothing to what belongs to it.
+"""
+BEGINNINGS = 5
 FINAL_ACK_TIMEOUT_S = 1.5
 BUSY_PAUSE_S = 1.0
 MAX_ITEMS = 10_000
@@ -27,6 +33,10 @@ with ERROR, also while the present transfer is going well. What counts is whethe
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 _KIND_NAMES = {MISSION: "mission", FENCE: "fence"}
+
+
+def _patience() -> Backoff:
+    return Backoff(FIRST_TIMEOUT_S, ATTEMPTS, LONGEST_TIMEOUT_S)
 
 
 def item_message(item: MissionItem, seq: int, peer: tuple[int, int], mission_type: int) -> Message:
@@ -70,7 +80,7 @@ class MissionUpload:
     deadline_s: float = math.inf
     wants: frozenset[str] = frozenset({"MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK"})
     _sent: set[int] = field(default_factory=set)
-    _backoff: Backoff = field(default_factory=lambda: Backoff(FIRST_TIMEOUT_S, ATTEMPTS))
+    _backoff: Backoff = field(default_factory=_patience)
 
     def start(self, now_s: float) -> list[Message]:
         self.deadline_s = now_s + self._backoff.take()
@@ -84,7 +94,7 @@ class MissionUpload:
         if message.seq >= len(self.items):
             return []  # a straggler of somebody's other transfer
         self._sent.add(message.seq)
-        self._backoff = Backoff(FIRST_TIMEOUT_S, ATTEMPTS)
+        self._backoff = _patience()
         self.deadline_s = now_s + FINAL_ACK_TIMEOUT_S
         return [item_message(self.items[message.seq], message.seq, self.peer, self.mission_type)]
 
@@ -95,7 +105,7 @@ class MissionUpload:
         if self._backoff.exhausted:
             self.done = True
             raise MissionTransferError(f"{self}: no answer after {len(self._sent)} of {len(self.items)} items")
-        if not self._sent:
+        if not self._sent or self._backoff.taken >= BEGIN_AGAIN_AFTER:
             return self.start(now_s)
         last = max(self._sent)  # the vehicle repeats its request by itself; this keeps its own timeout from running out
         self.deadline_s = now_s + self._backoff.take()
@@ -132,7 +142,8 @@ class MissionDownload:
     deadline_s: float = math.inf
     wants: frozenset[str] = frozenset({"MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK"})
     _count: int | None = None
-    _backoff: Backoff = field(default_factory=lambda: Backoff(FIRST_TIMEOUT_S, ATTEMPTS))
+    _beginnings: int = 1
+    _backoff: Backoff = field(default_factory=_patience)
 
     def start(self, now_s: float) -> list[Message]:
         self.deadline_s = now_s + self._backoff.take()
@@ -155,7 +166,7 @@ class MissionDownload:
                 raise MissionTransferError(f"{self}: refused: {enum_name('MAV_MISSION_RESULT', message.type)}")
             case _:
                 return []
-        self._backoff = Backoff(FIRST_TIMEOUT_S, ATTEMPTS)
+        self._backoff = _patience()
         if len(self.items) < (self._count or 0):
             return self.start(now_s)
         self.done = True
@@ -165,6 +176,10 @@ class MissionDownload:
         if self._backoff.exhausted:
             self.done = True
             raise MissionTransferError(f"{self}: no answer after {len(self.items)} items")
+        if self._count is not None and self._backoff.taken >= BEGIN_AGAIN_AFTER and self._beginnings < BEGINNINGS:
+            self._beginnings += 1
+            self._count = None
+            self.items.clear()
         return self.start(now_s)
 
     def __str__(self) -> str:

@@ -101,8 +101,9 @@ def test_converted_control_points_give_the_converted_trajectory():
     for time_s in np.linspace(5.0, 8.6, 13):
         here, there = trajectory.at(time_s), ned.at(time_s)
         np.testing.assert_allclose(there.position_m, frame.ned(here.position_m), atol=1e-5)
-        np.testing.assert_allclose(there.velocity_m_s, swap_enu_ned(here.velocity_m_s), atol=1e-4)
-        np.testing.assert_allclose(there.acceleration_m_s2, swap_enu_ned(here.acceleration_m_s2), atol=1e-4)
+        # metres of an autopilot's frame are those of a sphere: up to 0.4 % from the ellipsoid's
+        np.testing.assert_allclose(there.velocity_m_s, swap_enu_ned(here.velocity_m_s), rtol=0.004)
+        np.testing.assert_allclose(there.acceleration_m_s2, swap_enu_ned(here.acceleration_m_s2), rtol=0.004)
 
 
 def test_the_heading_turns_towards_the_path_no_faster_than_it_may():

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from missions.frames import (
     PX4_EARTH,

@@ -166,3 +166,12 @@ def test_the_autopilot_says_what_it_can():
     flown.command(512, 148)
     capabilities = flown.last("AUTOPILOT_VERSION").capabilities
     assert capabilities == 0xE8FF & ~mavlink.MAV_PROTOCOL_CAPABILITY_FTP  # PX4's, but for what is not here
+
+
+def test_the_same_order_given_again_is_a_new_order():
+    flown = Flown().take_off(4.0)
+    flown.command(21)
+    flown.command(176, 1, 4, 3)
+    assert flown.mode == "HOLD"
+    flown.command(21)
+    assert flown.mode == "LAND"

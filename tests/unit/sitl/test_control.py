@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from sitl.autopilot.parameter_table import parameter_table
 from sitl.control.attitude_control import attitude_control, mix
 from sitl.control.gains import GAINS
+from sitl.control.land_detection import detect_landing
 from sitl.control.position_control import is_flyable, position_control
 from sitl.dynamics.airframe import GRAVITY_M_S2, SIH
 from sitl.dynamics.state import Guidance, TakeoffStage, new_fleet
@@ -126,6 +127,32 @@ def test_the_vertical_integral_does_not_wind_up_at_full_thrust():
     fleet["velocity_integral_m_s2"][0, 2] = -9.0
     position_control(fleet[0], gains[0], False, DT_S)
     assert fleet["velocity_integral_m_s2"][0, 2] == pytest.approx(-9.0)
+
+
+def test_the_horizontal_integral_unwinds_while_the_tilt_is_at_its_limit():
+    gains = default_gains()
+    fleet = flying(setpoint_velocity_m_s=[12.0, 0.0, 0.0])
+    for _ in range(2500):  # held in place for ten seconds
+        position_control(fleet[0], gains[0], False, DT_S)
+    assert abs(fleet["velocity_integral_m_s2"][0, 0]) < 12.0  # without it: 48
+
+
+@pytest.mark.parametrize(
+    ("thrust", "sink_m_s", "ordered_m_s", "contact"),
+    [
+        (0.2, 0.0, 0.7, True),
+        (0.48, 0.0, 0.7, False),  # something carries it: the rotors
+        (0.2, 0.6, 0.7, False),  # it does sink
+        (0.2, 0.0, 0.0, False),  # nobody wants it down
+    ],
+)
+def test_the_ground_is_where_an_ordered_descent_stops_without_thrust(thrust, sink_m_s, ordered_m_s, contact):
+    gains = default_gains()
+    fleet = flying(setpoint_velocity_m_s=[0.0, 0.0, ordered_m_s], velocity_m_s=[0.0, 0.0, sink_m_s])
+    fleet["setpoint_thrust"] = thrust
+    for _ in range(100):
+        detect_landing(fleet[0], gains[0], DT_S)
+    assert bool(fleet["ground_contact"][0]) == contact
 
 
 @pytest.mark.parametrize(

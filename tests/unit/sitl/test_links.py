@@ -124,6 +124,14 @@ def test_intervals_are_set_per_link_and_back_to_their_default():
     assert rates(flown, Link.ONBOARD, 4.0)["ATTITUDE"] == 50.0
 
 
+def test_no_message_comes_twice_for_one_moment():
+    flown = Flown().boot()
+    flown.command(511, mavlink.MAVLINK_MSG_ID_ATTITUDE, 20_000)
+    flown.run(1.0)
+    times = [m.time_boot_ms for m in flown.messages("ATTITUDE")]
+    assert len(times) == len(set(times))
+
+
 @pytest.mark.parametrize(("interval_us", "shown"), [(200_000, 200_000), (-1, -1), (0, 1_000_000)])
 def test_intervals_can_be_read(interval_us, shown):
     flown = Flown().boot()

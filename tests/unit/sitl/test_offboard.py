@@ -39,6 +39,15 @@ def test_one_setpoint_just_before_the_command_is_enough():
     assert flown.command(176, 1, 6, link=Link.ONBOARD) == ACCEPTED
 
 
+def test_offboard_may_be_left_and_entered_again_on_the_same_setpoint():
+    flown = hovering()
+    flown.stream(velocity=(0.0, 1.0, 0.0)).run(0.1)
+    flown.go_silent().run(0.1)
+    flown.command(176, 1, 4, 3)
+    assert flown.command(176, 1, 6, link=Link.ONBOARD) == ACCEPTED
+    assert flown.run(0.5).velocity[0] > 0.3
+
+
 @pytest.mark.parametrize(
     ("mask", "position", "velocity", "acceleration", "moves_north"),
     [

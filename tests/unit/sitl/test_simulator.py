@@ -129,3 +129,10 @@ def test_the_truth_log_has_its_header_all_vehicles_and_the_missions_frame(tmp_pa
 def test_datagrams_may_come_before_the_first_step():
     flown = Flown()
     assert flown.command(401) == 0
+
+
+def test_local_positions_begin_at_zero_whatever_the_altitude_reads():
+    flown = Flown(field(3, positioning=GNSS), seed=5).run(0.1)
+    for sysid in (1, 2, 3):
+        local = flown.last("LOCAL_POSITION_NED", sysid, Link.ONBOARD)
+        assert np.allclose([local.x, local.y, local.z], 0.0, atol=0.2)
