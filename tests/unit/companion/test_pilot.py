@@ -52,11 +52,11 @@ def test_its_status_names_the_mission_file_and_the_plan():
     assert status.plan_id == plan_id(items_of())
 
 
-def test_its_status_comes_twice_a_second_and_at_every_change():
+def test_its_status_comes_five_times_a_second_and_at_every_change():
     rig = Rig().connect()
     rig.sent.clear()
     rig.run(2.0)
-    assert len(of(rig.sent, instructions.SendStatus)) in {4, 5}
+    assert len(of(rig.sent, instructions.SendStatus)) in {9, 10, 11}
     changed = rig.load(items_of())
     assert of(changed, instructions.SendStatus)[-1].status.state is State.READY
 

@@ -23,7 +23,7 @@ def sent(messages: list) -> list[str]:
     return [message.get_type() for message in messages]
 
 
-def time_out(service, times: int = 20) -> None:
+def time_out(service, times: int = 30) -> None:
     """Let deadline after deadline pass."""
     for _ in range(times):
         service.handle_timeout(service.deadline_s)
@@ -244,6 +244,18 @@ def test_a_download_asks_item_by_item_and_again_for_what_is_lost():
         download.receive(from_autopilot(item_message(ITEMS[seq], seq, (255, 190), 0)), 0.2)
     assert sent(answer) == ["MISSION_ACK"]
     assert [(item.x, item.z) for item in download.items] == [(item.x, item.z) for item in ITEMS]
+
+
+def test_a_download_that_the_vehicle_has_forgotten_begins_again():
+    download = MissionDownload(PEER)
+    download.start(0.0)
+    download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 3, 0)), 0.1)
+    download.receive(from_autopilot(item_message(ITEMS[0], 0, (255, 190), 0)), 0.2)
+    asked = [sent(download.handle_timeout(download.deadline_s)) for _ in range(7)]
+    assert asked[:5] == [["MISSION_REQUEST_INT"]] * 5
+    assert download.deadline_s > 5.0  # a PX4 has given up by then
+    assert asked[6] == ["MISSION_REQUEST_LIST"]
+    assert download.items == []
 
 
 def test_an_empty_vehicle_downloads_as_empty():

@@ -185,6 +185,9 @@ def test_holding_at_the_target_is_arrival_where_the_mission_says_so():
     flight.at(TARGET.position_m)
     flight.say(CompanionState.HOLDING, Reason.TARGET_REACHED)
     flight.wait(0.2)
+    assert flight.monitor.phase is Phase.FLYING  # for as long as the autopilot itself does not say that it holds
+    flight.state.mode = Mode.HOLD
+    flight.wait(0.2)
     assert (flight.monitor.phase, flight.monitor.reached) == (Phase.DONE, True)
 
 
