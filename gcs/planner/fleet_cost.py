@@ -151,6 +151,34 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
 
 
 @compiled
+def plan_costs(problem: Problem, controls_m: Array, objective: Array, violation: Array) -> None:
+    """Costs of many whole plans, as `fleet_cost` has them, without gradients.
+
+    Args:
+        problem: what is planned; its guides are of no account.
+        controls_m: (plans, vehicles, n, 3) control points, ENU [m], start and target included.
+        objective: (plans,) is filled with eq. 13, summed over all vehicles.
+        violation: (plans,) is filled with the sums of all squared violations.
+    """
+    n_plans, n_vehicles = controls_m.shape[:2]
+    n_samples, n_fractions = len(problem.samples.first), len(problem.coupling.first)
+    points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
+    places, unused = np.empty((n_vehicles, n_fractions, 3)), np.zeros((n_vehicles, n_fractions, 3))
+    side, share, steps = np.empty(n_fractions, np.int64), np.empty(n_fractions), np.empty(n_vehicles)
+    unwanted = new_adjoint(0)
+    for plan in range(n_plans):
+        objective[plan] = violation[plan] = 0.0
+        for i in range(n_vehicles):
+            cost, broken = curve_cost(
+                controls_m[plan, i], problem.samples, problem.terms, problem.obstacles, points, chords, unwanted
+            )
+            objective[plan], violation[plan] = objective[plan] + cost, violation[plan] + broken
+            steps[i] = at_fractions(points, chords, places[i], side, share)
+        if n_vehicles > 1:
+            violation[plan] += _between_all(problem.coupling, 0.0, places, steps, unused)
+
+
+@compiled
 def _to_offsets(by_control: Array, axes_m: Array, gradient: Array) -> None:
     """Derivatives by offsets from (n, 3) derivatives by control points."""
     for i in range(len(axes_m)):

@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 
 from gcs.planner.allocation import allocate
-from gcs.planner.fleet_cost import Problem, fleet_cost, no_others, set_context, swarm_cost
+from gcs.planner.fleet_cost import (
+    Problem,
+    all_control_points,
+    fleet_cost,
+    no_others,
+    plan_costs,
+    set_context,
+    swarm_cost,
+)
 from gcs.planner.obstacle_gradient import clearances, heights
 from gcs.planner.problem import guides, pose
 from missions import obstacles
@@ -115,3 +123,12 @@ def test_a_particle_costs_what_the_plan_changes_by_when_its_vehicle_flies_it(pro
     whole = np.array([fleet_cost(problem, plan, np.empty_like(plan)) for plan in plans])
     np.testing.assert_allclose(np.diff(objective), np.diff(whole[:, 0]), rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(np.diff(violation), np.diff(whole[:, 1]), rtol=1e-6, atol=1e-9)
+
+
+def test_many_plans_at_once_cost_what_each_costs(problem: Problem):
+    plans = [some_offsets(problem, seed) for seed in range(4)]
+    controls = np.array([all_control_points(problem, offsets) for offsets in plans])
+    objective, violation = np.empty(len(plans)), np.empty(len(plans))
+    plan_costs(problem, controls, objective, violation)
+    expected = [fleet_cost(problem, offsets, np.empty_like(offsets)) for offsets in plans]
+    np.testing.assert_allclose(np.stack((objective, violation), axis=1), expected, rtol=1e-12)
