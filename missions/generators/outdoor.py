@@ -19,6 +19,8 @@ TERRAIN_TARGETS_M = ((560.0, 1400.0), (140.0, 900.0))
 TERRAIN_TARGET_SPACING_M = 90.0
 MEAN_DISTANCE_M = (130.0, 480.0)
 """From each target to the others: paths from one point make half of it, and limits are 50 m and 300 m."""
+START_RADII = 2.5
+TARGET_SPARE_M = 100.0
 
 FLEET_GRID_M = 30.0
 FLEET_TARGETS_M = ((300.0, 1500.0), (140.0, 900.0))
@@ -116,14 +118,17 @@ def _obstructed(rng: np.random.Generator, bounds: Bounds, starts_m: Array, targe
 
 
 def _in_the_way(rng: np.random.Generator, starts_m: Array, targets_m: Array, radius_m: float) -> tuple[float, float]:
-    """A centre near the ground track of a random straight line, more than the radius away from starts and targets."""
+    """A centre near the ground track of a random straight line, far enough from all starts and targets.
+
+    From starts that is `START_RADII` radii, where nothing is left of a peak, so that they stand on level ground.
+    """
     while True:
         start_m, target_m = starts_m[rng.integers(len(starts_m))], targets_m[rng.integers(len(targets_m))]
         on_line_m = start_m + rng.uniform(0.2, 0.85) * (target_m - start_m)
         centre_m = np.round(on_line_m[:2] + rng.uniform(-radius_m, radius_m, 2), 1)
-        ends_m = np.concatenate((starts_m, targets_m))[:, :2]
-        spare_m = np.linalg.norm(ends_m - centre_m, axis=1).min() - radius_m
-        if spare_m > 100.0:
+        from_start_m = np.linalg.norm(starts_m[:, :2] - centre_m, axis=1).min()
+        from_target_m = np.linalg.norm(targets_m[:, :2] - centre_m, axis=1).min()
+        if from_start_m > START_RADII * radius_m and from_target_m > radius_m + TARGET_SPARE_M:
             return float(centre_m[0]), float(centre_m[1])
 
 

@@ -83,6 +83,12 @@ def test_terrains_have_room_for_the_limits_between_vehicles(vehicles: int):
         assert 3 <= len(mission.world.peaks) + len(mission.world.threats) <= 5
 
 
+def test_launch_points_of_terrains_lie_on_level_ground():
+    for seed in range(20):
+        mission = terrain(seed, 10)
+        assert obstacles.terrain_height(np.zeros((1, 3)), obstacles.pack(mission.world))[0] < 1e-9
+
+
 def test_most_terrains_obstruct_some_straight_line():
     limit_m = load_mission("terrain-1-5uav").limits.clearance_m
     assert sum(straight_clearances_m(terrain(seed, 5)).min() < limit_m for seed in range(20)) >= 15
