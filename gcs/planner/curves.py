@@ -9,7 +9,7 @@ from missions import bspline, time_law
 Array = npt.NDArray[np.float64]
 
 TABLE = 1024
-"""Samples from which the parameter is found at which a curve has a given length."""
+"""Samples from which the parameter is found at which a curve has a given length; more for wild curves."""
 SPARE = 0.99
 """Samples lie at most this share of the allowed spacing apart."""
 
@@ -21,8 +21,18 @@ def dense_curves(controls_m: Array, spacing_m: float) -> Array:
         controls_m: (vehicles, n, 3) control points, ENU [m].
         spacing_m: between samples.
     """
-    u = np.linspace(0.0, 1.0, TABLE)
-    rows = bspline.sampled_basis(controls_m.shape[1], TABLE)
+    table = TABLE
+    curves_m = _sampled(controls_m, spacing_m, table)
+    while lengths(np.diff(curves_m, axis=1)).max() > spacing_m:  # the table is too coarse for curves this wild
+        table *= 2
+        curves_m = _sampled(controls_m, spacing_m, table)
+    return curves_m
+
+
+def _sampled(controls_m: Array, spacing_m: float, table: int) -> Array:
+    """Dense curves, whose parameters at equal steps of length are interpolated in so many samples."""
+    u = np.linspace(0.0, 1.0, table)
+    rows = bspline.sampled_basis(controls_m.shape[1], table)
     flown_m = [time_law.arc_length(rows @ control_m) for control_m in controls_m]
     longest_m = max(float(along_m[-1]) for along_m in flown_m)
     count = max(int(np.ceil(longest_m / (SPARE * spacing_m))) + 1, 3)
