@@ -23,6 +23,7 @@ COMPANION = Path(sys.executable).with_name("companion")
 INDOOR = load_mission("indoor")
 TRACK_M = np.array([[4.0, 5.2, 1.5], [7.0, 4.2, 1.5], [10.0, 5.0, 1.5], [14.0, 6.0, 1.5], [19.0, 8.5, 1.5]])
 HEARTBEAT_INTERVAL_S = 0.5
+COMMAND_REPEAT_S = 1.0
 
 
 @contextmanager
@@ -48,46 +49,65 @@ class FlightDesk(GroundStation):
     def __init__(self, base: int) -> None:
         super().__init__(base)
         self._next_heartbeat_s = 0.0
+        self._tunnels_read = 0
+        self._statuses: list[tunnel.CompanionStatus] = []
+        self._trajectories: list[tunnel.TrajectoryMessage] = []
 
     def listen(self) -> list[Any]:
         if time.monotonic() >= self._next_heartbeat_s:
             self._next_heartbeat_s = time.monotonic() + HEARTBEAT_INTERVAL_S
             self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-        return super().listen()
+        heard = super().listen()
+        self._read_tunnels()
+        return heard
 
     # ---------------------------------------------------------------------- what is heard
 
     @property
     def statuses(self) -> list[tunnel.CompanionStatus]:
-        return [tunnel.decode_status(payload) for payload in self._payloads(PayloadType.COMPANION_STATUS)]
+        self.listen()
+        return self._statuses
 
     @property
     def trajectories(self) -> list[tunnel.TrajectoryMessage]:
-        return [tunnel.decode_trajectory(payload) for payload in self._payloads(PayloadType.TRAJECTORY)]
+        self.listen()
+        return self._trajectories
 
     @property
     def state(self) -> CompanionState | None:
-        found = self.statuses
-        return found[-1].state if found else None
+        return self.statuses[-1].state if self.statuses else None
 
     @property
     def mode(self) -> int:
-        return [m for m in self.listen() if m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1][-1].custom_mode
+        return self.last("HEARTBEAT", component=1).custom_mode
 
-    def _payloads(self, kind: PayloadType) -> list[bytes]:
-        tunnels = [m for m in self.listen() if m.get_type() == "TUNNEL" and m.payload_type == kind]
-        return [bytes(m.payload[: m.payload_length]) for m in tunnels]
+    def _read_tunnels(self) -> None:
+        tunnels = self._by_kind["TUNNEL"]
+        for message in tunnels[self._tunnels_read :]:
+            payload = bytes(message.payload[: message.payload_length])
+            if message.payload_type == PayloadType.COMPANION_STATUS:
+                self._statuses.append(tunnel.decode_status(payload))
+            elif message.payload_type == PayloadType.TRAJECTORY:
+                self._trajectories.append(tunnel.decode_trajectory(payload))
+        self._tunnels_read = len(tunnels)
 
     # -------------------------------------------------------------------- what is commanded
 
     def command(self, number: int, *params: float, component: int = 1) -> Any:
-        """Send a COMMAND_LONG; its COMMAND_ACK."""
-        heard = len(self.listen())
+        """The COMMAND_ACK of a COMMAND_LONG, sent again while there is none.
+
+        A companion hears a ground station from its first heartbeat on.
+        """
+        before = len(self.of("COMMAND_ACK"))
         values = (*params, *(0.0,) * (7 - len(params)))
-        self.send(mavlink.MAVLink_command_long_message(1, component, number, 0, *values))
+        repeat_at_s = 0.0
 
         def answer() -> Any:
-            found = [m for m in self.listen()[heard:] if m.get_type() == "COMMAND_ACK" and m.command == number]
+            nonlocal repeat_at_s
+            if time.monotonic() >= repeat_at_s:
+                repeat_at_s = time.monotonic() + COMMAND_REPEAT_S
+                self.send(mavlink.MAVLink_command_long_message(1, component, number, 0, *values))
+            found = [m for m in self.of("COMMAND_ACK")[before:] if m.command == number]
             return next((m for m in found if m.get_srcComponent() == component), None)
 
         return self.until(answer)

@@ -4,6 +4,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -64,6 +65,7 @@ class GroundStation:
         self._parser = mavlink.MAVLink(None)
         self._parser.robust_parsing = True
         self.heard: list[Any] = []
+        self._by_kind: dict[str, list[Any]] = defaultdict(list)
 
     def close(self) -> None:
         self._socket.close()
@@ -79,11 +81,25 @@ class GroundStation:
                 datagram = self._socket.recv(2048)
             except BlockingIOError:
                 return self.heard
-            self.heard += self._parser.parse_buffer(datagram) or []
+            for message in self._parser.parse_buffer(datagram) or []:
+                self.heard.append(message)
+                self._by_kind[message.get_type()].append(message)
 
-    def last(self, kind: str, sysid: int = 1) -> Any:
-        found = [m for m in self.listen() if m.get_type() == kind and m.get_srcSystem() == sysid]
-        return found[-1] if found else None
+    def of(self, kind: str) -> list[Any]:
+        """All messages of one kind so far."""
+        self.listen()
+        return self._by_kind[kind]
+
+    def last(self, kind: str, sysid: int = 1, component: int | None = None) -> Any:
+        """The newest message of one kind from one system; None where there is none."""
+        senders = {component} if component is not None else range(256)
+        newest_first = reversed(self.of(kind))
+        return next((m for m in newest_first if m.get_srcSystem() == sysid and m.get_srcComponent() in senders), None)
+
+    def forget(self) -> None:
+        """Begin anew with nothing heard."""
+        self.heard.clear()
+        self._by_kind.clear()
 
     def until(self, holds: Callable[[], Any], timeout_s: float = 10.0) -> Any:
         """Listen until something holds; what it was."""

@@ -145,7 +145,7 @@ def items(*norths_m: float) -> list[MissionItem]:
 
 def upload_from_the_ground(ground: GroundStation, sysid: int, mission: list[MissionItem]) -> None:
     """Another client's upload."""
-    ground.heard.clear()
+    ground.forget()
     ground.send(mavlink.MAVLink_mission_count_message(sysid, 1, len(mission), 0), sysid)
     ground.until(lambda: ground.last("MISSION_REQUEST", sysid) or ground.last("MISSION_REQUEST_INT", sysid))
     for i in mission:
@@ -235,4 +235,4 @@ async def first_of(found: list):
 
 
 async def heard(ground: GroundStation, kind: str, compid: int):
-    return [m for m in ground.listen() if m.get_type() == kind and m.get_srcComponent() == compid]
+    return [m for m in ground.of(kind) if m.get_srcComponent() == compid]
