@@ -31,10 +31,12 @@ demo: install  ## fly the paper's indoor mission on the bundled simulator and sh
 	$(BIN)/gcs fly indoor --sim
 
 test: $(VENV)/.installed-dev  ## all tests but the slow ones: first what runs in one process, then the real programs and the browser
+	@$(BIN)/python -m tests.browser.chromium
 	$(TEST) -n 2 -m "not slow and not processes and not browser"
 	$(TEST) -m "not slow and (processes or browser)"
 
 test-all: $(VENV)/.installed-dev  ## every test, the slow ones too
+	@$(BIN)/python -m tests.browser.chromium
 	$(TEST) -n 2 -m "not processes and not browser"
 	$(TEST) -m "processes or browser"
 

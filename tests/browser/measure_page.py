@@ -39,7 +39,7 @@ def circling(count: int) -> ScriptedDesk:
         centre_m = np.array([12.0 * (index % 10), 12.0 * (index // 10), 5.0])
         curve_m = centre_m + 4.0 * np.stack((np.cos(angles), np.sin(angles), 0.2 * np.sin(3 * angles)), axis=1)
         track, target = Track(curve_m[-1:], np.array([3.0])), load_mission("field").targets[0]
-        vehicle.plan = VehiclePlan("", vehicle.sysid, target, curve_m, angles * 4.0 / 3.0, track, 1.0)
+        vehicle.plan = VehiclePlan("", vehicle.sysid, (target,), curve_m, angles * 4.0 / 3.0, track, 1.0)
         vehicle.mode, vehicle.armed, vehicle.companion = Mode.OFFBOARD, True, CompanionState.FLYING
     return scripted
 

@@ -59,7 +59,7 @@ def _part(mission: Mission, vehicle: Vehicle, target: Target, index: int) -> Veh
     return VehiclePlan(
         name=vehicle.name,
         sysid=vehicle.sysid,
-        target=target,
+        targets=(target,),
         curve_m=curve_m,
         times_s=times_along(curve_m, np.full(SAMPLES, speed_m_s)),
         track=Track(track_m, np.full(TRACK_POINTS, speed_m_s)),
