@@ -6,13 +6,15 @@ from collections.abc import Callable
 from gcs.errors import UsageError
 from gcs.planner.allocation import allocate
 from gcs.planner.assembly import vehicle_plans
+from gcs.planner.baselines import BASELINES, BaselineSearch
 from gcs.planner.budget import new_budget
 from gcs.planner.plan import FleetPlan, Progress
 from gcs.planner.search import FleetSearch
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
 
-ALGORITHMS = ("ecpso",)
+ALGORITHMS = ("ecpso", *BASELINES)
+"""The planner itself, and what the paper compares it with (`baselines`)."""
 
 
 def plan_mission(
@@ -48,7 +50,11 @@ def plan_mission(
         raise UsageError(f"--algorithm {algorithm}: expected one of {', '.join(ALGORITHMS)}")
     began_cpu_s = time.thread_time()
     budget = new_budget(evaluations, budget_s, clock, should_stop)
-    search = FleetSearch(mission, allocate(mission), seed, budget, on_progress or (lambda _: None))
+    listener = on_progress or (lambda _: None)
+    if algorithm in BASELINES:
+        search = BaselineSearch(mission, allocate(mission), seed, budget, listener, algorithm)
+    else:
+        search = FleetSearch(mission, allocate(mission), seed, budget, listener)
     found = search.run()
     return FleetPlan(
         mission=mission.name,
