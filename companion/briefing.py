@@ -11,6 +11,9 @@ from missions.mission import Mission, Vehicle
 from missions.mission_items import MissionItem, Track, decode_track, plan_id
 from missions.tunnel import Reason
 
+WIRE_TOLERANCE_M = 0.05
+"""A track point that has travelled as latitude, longitude and altitude is where it was to within this."""
+
 
 @dataclass(frozen=True)
 class FlightOrder:
@@ -34,7 +37,7 @@ class Briefing:
     Args:
         mission: the mission file.
         vehicle: this one.
-        mode: with ONBOARD, track points before the last one, the target, are not flown.
+        mode: with ONBOARD, only those track points are flown that are targets.
     """
 
     mission: Mission
@@ -98,8 +101,16 @@ class Briefing:
             self.problem = "a waypoint is not a place"
             return
         if self.mode is PlanningMode.ONBOARD:
-            track = Track(track.points_m[-1:], track.speeds_m_s[-1:], track.item_seq[-1:])
+            track = self._targets_of(track)
         self._order = FlightOrder(self.plan_id, track, frame)
+
+    def _targets_of(self, track: Track) -> Track:
+        """The points of a track that are targets of the mission, and its last one."""
+        targets_m = np.array([target.position_m for target in self.mission.targets])
+        off_m = np.linalg.norm(track.points_m[:, None] - targets_m, axis=2).min(axis=1)
+        off_m[-1] = 0.0
+        kept = np.flatnonzero(off_m < WIRE_TOLERANCE_M).tolist()
+        return Track(track.points_m[kept], track.speeds_m_s[kept], tuple(track.item_seq[i] for i in kept))
 
     @property
     def order(self) -> FlightOrder | None:

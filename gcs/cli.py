@@ -1,4 +1,4 @@
-"""The command line of the ground station: `gcs fly`, `gcs plan`, `gcs check`, `gcs watch`."""
+"""The command line of the ground station: `gcs fly`, `gcs plan`, `gcs check`, `gcs watch`, `gcs experiment`."""
 
 import asyncio
 import contextlib
@@ -105,7 +105,7 @@ def fly(
 @app.command()
 def plan(
     mission: MissionArgument,
-    algorithm: Annotated[str, typer.Option(help="the planner")] = "ecpso",
+    algorithm: Annotated[str, typer.Option(help="ecpso; to compare: pso, ipso, gapso, ca, aca")] = "ecpso",
     seed: SeedOption = 0,
     evaluations: Annotated[int | None, typer.Option(min=1, help="stop after so many evaluations")] = None,
     budget_s: Annotated[float | None, typer.Option("--budget-s", min=0.001, help="stop after so much time")] = None,
@@ -113,9 +113,11 @@ def plan(
 ) -> None:
     """Plan a mission and say what came out; nothing is sent to any vehicle.
 
-    Example:
+    Examples:
 
         gcs plan terrain-1-5uav --seed 3 --output plan.json
+
+        gcs plan indoor --algorithm pso --evaluations 3000
     """
     if output is not None:
         _check_output(output)
@@ -154,8 +156,8 @@ def check(mission: MissionArgument) -> None:
             names = (thing.name + ("" if thing.known else " (unmapped)") for thing in things)
             print(f"  {kind:9} {', '.join(names)}")
     for vehicle in loaded.vehicles:
-        target = (loaded.allocation or {}).get(vehicle.name, "allocated by the planner")
-        print(f"  vehicle   {vehicle.name} (system {vehicle.sysid}) from {list(vehicle.pad_m)} to {target}")
+        given = "what the planner allocates" if loaded.routes is None else ", then ".join(loaded.routes[vehicle.name])
+        print(f"  vehicle   {vehicle.name} (system {vehicle.sysid}) from {list(vehicle.pad_m)} to {given or 'nowhere'}")
     print(f"  arrival   {loaded.on_arrival.value}")
 
 
@@ -180,6 +182,40 @@ def watch(
     events = EventLog(time.monotonic, listeners=[console.show])
     console.say(f"page: http://127.0.0.1:{port}")
     asyncio.run(run_watch(links, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
+
+
+@app.command()
+def experiment(
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="ackley, allocation, paths, convergence, table2, ablation or scaling"),
+    ],
+    runs: Annotated[int | None, typer.Option(min=1, help="seeds; the default is the experiment's own")] = None,
+    seed0: Annotated[int, typer.Option(min=0, help="the first seed")] = 0,
+    executor: Annotated[
+        str | None, typer.Option(metavar="URL", help="a Dask scheduler; without it, all cores of this machine")
+    ] = None,
+    output: Annotated[Path, typer.Option(metavar="DIR", help="where rows, pictures and summary go")] = Path(
+        "out/experiments"
+    ),
+) -> None:
+    """Reproduce a table or a figure of the paper: NAME.csv, NAME.md and pictures.
+
+    Rows are written as runs are done. Interrupted with Ctrl-C and started again, it goes on with what is missing.
+
+    Examples:
+
+        gcs experiment ackley                                  figure 5
+
+        gcs experiment table2 --runs 5 --output out/table2     table 2, five seeds
+
+        gcs experiment table2 --executor tcp://127.0.0.1:8786  on a Dask cluster (pip install 'end-cloud-gcs[cluster]')
+    """
+    from rich.console import Console
+
+    from gcs.experiments.command import Order, run_experiment
+
+    run_experiment(Order(name, runs, seed0, executor, output), Console(highlight=False, soft_wrap=True))
 
 
 @app.command()

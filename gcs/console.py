@@ -72,8 +72,10 @@ def print_plan(console: Console, plan: FleetPlan) -> None:
     for part in plan.vehicles:
         duration_s = part.times_s[-1] if len(part.times_s) else 0.0
         cells = (f"{part.length_m:.1f} m", f"{duration_s:.1f} s", str(len(part.track.points_m)))
-        table.add_row(part.name, part.target.name, *cells)
+        table.add_row(part.name, ", ".join(target.name for target in part.targets), *cells)
     console.print(table)
+    if plan.staying:
+        console.print(f"no target, and so on its pad: {', '.join(plan.staying)}", markup=False)
     verdict = "feasible" if plan.feasible else "NOT feasible"
     effort = f"{plan.evaluations} evaluations, {plan.wall_s:.2f} s"
     console.print(f"{verdict}, objective {plan.objective:.2f}, {plan.algorithm} seed {plan.seed}, {effort}")

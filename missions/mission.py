@@ -189,8 +189,8 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     world: World
     vehicles: Annotated[tuple[Vehicle, ...], msgspec.Meta(min_length=1, max_length=250)]
     targets: Annotated[tuple[Target, ...], msgspec.Meta(min_length=1, max_length=1000)]
-    allocation: dict[str, str] | None = None
-    """Vehicle name -> target name; without it the planner allocates."""
+    allocation: dict[str, str | tuple[str, ...]] | None = None
+    """Vehicle name -> target name, or names in flying order; with none, it stays. Without it the planner allocates."""
     launch_point_m: Point3 | None = None
     """Where all curves begin; without it each begins above its vehicle's pad."""
     launch_zone_radius_m: NotNegative = 0.0
@@ -213,6 +213,13 @@ class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     def digest(self) -> int:
         """CRC-32 over everything in the mission: two programs with the same digest have read the same mission."""
         return zlib.crc32(msgspec.json.encode(self, order="deterministic"))
+
+    @property
+    def routes(self) -> dict[str, tuple[str, ...]] | None:
+        """Vehicle name -> names of its targets in flying order, as the mission allocates them; None if it does not."""
+        if self.allocation is None:
+            return None
+        return {name: (given,) if isinstance(given, str) else given for name, given in self.allocation.items()}
 
     def vehicle(self, sysid: int) -> Vehicle:
         """The vehicle with this MAVLink system id.
@@ -309,19 +316,23 @@ def _crowded(mission: Mission) -> Iterator[tuple[str, str]]:
 
 
 def _misallocated(mission: Mission) -> Iterator[tuple[str, str]]:
-    if mission.allocation is None:
+    if mission.routes is None:
         return
     vehicles = {vehicle.name for vehicle in mission.vehicles}
     targets = {target.name for target in mission.targets}
-    for vehicle, target in mission.allocation.items():
+    for vehicle, route in mission.routes.items():
         if vehicle not in vehicles:
             yield (
                 f"allocation.{vehicle}",
                 f"expected one of the vehicles {sorted(vehicles)}, found {vehicle!r}",
             )
-        if target not in targets:
-            yield f"allocation.{vehicle}", f"expected one of the targets {sorted(targets)}, found {target!r}"
-    if len(set(mission.allocation.values())) < len(mission.allocation):
-        yield "allocation", "one target is given to two vehicles"
-    if missing := vehicles - mission.allocation.keys():
+        for target in route:
+            if target not in targets:
+                yield f"allocation.{vehicle}", f"expected one of the targets {sorted(targets)}, found {target!r}"
+    given = [target for route in mission.routes.values() for target in route]
+    if not given:
+        yield "allocation", "expected a target for one vehicle at least, found none"
+    if len(set(given)) < len(given):
+        yield "allocation", "one target is given to two vehicles, or twice to one"
+    if missing := vehicles - mission.routes.keys():
         yield "allocation", f"expected every vehicle, {', '.join(sorted(missing))} is missing"

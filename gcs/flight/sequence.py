@@ -23,7 +23,7 @@ from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.mission import Mission, OnArrival, Site, Vehicle
 from missions.mission_items import Command as ItemCommand
-from missions.mission_items import MissionItem, Track, encode_track, plan_id
+from missions.mission_items import MissionItem, encode_track, plan_id
 from missions.tunnel import CompanionState
 
 CONNECT_TIMEOUT_S = 240.0
@@ -101,9 +101,7 @@ class FleetFlight:
 
     @property
     def success(self) -> bool:
-        return len(self.vehicles) == len(self.mission.vehicles) and all(
-            flight.monitor.reached for flight in self.vehicles.values()
-        )
+        return bool(self.vehicles) and all(flight.monitor.reached for flight in self.vehicles.values())
 
     async def fly(self) -> None:
         """The whole flight, or what is left of it: a plan and an upload that were asked for before are kept.
@@ -260,7 +258,7 @@ class FleetFlight:
         assert flight.plan is not None
         track, ending = flight.plan.track, None
         if self.mode is PlanningMode.ONBOARD:
-            track = Track(track.points_m[-1:], track.speeds_m_s[-1:])
+            track = flight.plan.targets_alone
         if self.mode is PlanningMode.CLOUD:
             endings = {OnArrival.LAND: ItemCommand.NAV_LAND, OnArrival.RTL: ItemCommand.NAV_RETURN_TO_LAUNCH}
             ending = endings.get(self.mission.on_arrival)

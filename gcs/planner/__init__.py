@@ -4,7 +4,8 @@ Layers, each importing only what stands below it:
 
     planner                              plan_mission: the way in
     search                               swarms, polish and judge in turn
-    allocation, cooperation, guide_path  who flies where; one swarm per vehicle; ways around obstacles
+    allocation, target_order             who flies where, and in which order
+    cooperation, guide_path              one swarm per vehicle; ways around obstacles
     assembly                             the plan that is handed out
     feasibility                          the judge of it
     timing, track_points, objective      times, track points and eq. 13 of dense curves

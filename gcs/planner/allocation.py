@@ -1,60 +1,154 @@
-"""Who flies to which target: as the mission says, or as costs least in total."""
+"""Who flies to which targets, and in which order: as the mission says, or so that ways are short and balanced.
+
+Ways are as long as they have to be flown: straight, bent around what is in the way, or along a path through a maze.
+Only the ways that an allocation would use are looked at: a straight line is never longer than the way, so an allocation
+that is best with the ways it uses at their true lengths, and all others at those of straight lines, is the best of all.
+"""
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from gcs.planner.fleet_cost import Problem, no_others, swarm_cost
+from gcs.planner.curves import lengths, path_lengths
+from gcs.planner.fleet_cost import no_others, swarm_cost
+from gcs.planner.guide_path import guide_path
+from gcs.planner.limits import path_limit_m
 from gcs.planner.problem import Route, guides, pose
 from gcs.planner.representation import bows
-from missions.errors import InfeasibleMission
-from missions.mission import Mission, Target
+from gcs.planner.target_order import balanced_routes
+from missions.mission import Mission, Target, Vehicle
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Leg = tuple[int, int]
+"""From a place to a target, by their indices; the starts of all vehicles come before the targets."""
+Solve = Callable[[Array], list[list[int]]]
+"""Targets of each vehicle in flying order, by a (vehicles + targets, targets) table of lengths."""
+
+UNREACHABLE_M = 1e7
+"""The length of a way that there is not, or that is too long for one flight."""
+SIDES = 0.02
+"""Ways through one gap are equally long whoever flies to which target behind it. With so much of the squares of
+straight distances added, vehicles then do not change sides."""
+FLYABLE = 1e-4
+"""A curve with a smaller sum of squared violations is a way."""
 
 
 def allocate(mission: Mission) -> list[Route]:
-    """One route per vehicle, in the order of the mission's vehicles.
+    """One route per vehicle that flies, in the order of the mission's vehicles; the others stay on their pads.
 
-    Without an allocation in the mission, every vehicle gets one target so that the costs (eq. 13) of the best first
-    particles add up to the least; what vehicles owe to one another is left to the search.
-
-    Raises:
-        InfeasibleMission: the mission allocates nothing, and has not as many targets as vehicles.
+    Without an allocation in the mission, each vehicle gets one target so that the ways are shortest in total; with
+    fewer targets some vehicles stay; with more, all share them so that the longest route is short. Vehicles that begin
+    in one point are told apart by their pads (docs/decisions/0016-allocation.md).
     """
-    if mission.allocation is not None:
+    given = mission.routes
+    if given is not None:
         by_name = {target.name: target for target in mission.targets}
-        return _routes(mission, [by_name[mission.allocation[vehicle.name]] for vehicle in mission.vehicles])
-    if len(mission.targets) != len(mission.vehicles):
-        raise InfeasibleMission(
-            f"mission {mission.name}: expected as many targets as vehicles, or an allocation that names one target per "
-            f"vehicle, found {len(mission.vehicles)} vehicles and {len(mission.targets)} targets"
-        )
-    if mission.launch_point_m is not None:  # all start in one point: every allocation costs the same
-        return _routes(mission, list(mission.targets))
-    _, chosen = linear_sum_assignment(path_costs(mission))
-    return _routes(mission, [mission.targets[index] for index in chosen])
-
-
-def path_costs(mission: Mission) -> Array:
-    """(vehicles, targets) costs of the best first particle of each vehicle to each target, flown alone."""
-    costs = np.empty((len(mission.vehicles), len(mission.targets)))
-    for row, vehicle in enumerate(mission.vehicles):
-        routes = [Route(vehicle.name, vehicle.sysid, mission.start_m(vehicle), target) for target in mission.targets]
-        problem = pose(mission, routes, guides(mission, routes))
-        costs[row] = [_best_alone(problem, index) for index in range(len(routes))]
-    return costs
-
-
-def _best_alone(problem: Problem, index: int) -> float:
-    first = bows(problem.base_m.shape[1])
-    objective, violation = np.empty(len(first)), np.empty(len(first))
-    swarm_cost(problem, index, first, no_others(), objective, violation)
-    return float(np.min(objective + problem.terms.penalty_weight * violation))
-
-
-def _routes(mission: Mission, targets: list[Target]) -> list[Route]:
+        targets = [tuple(by_name[name] for name in given[vehicle.name]) for vehicle in mission.vehicles]
+    else:
+        chosen = _chosen(mission)
+        targets = [tuple(mission.targets[index] for index in route) for route in chosen]
     return [
-        Route(vehicle.name, vehicle.sysid, mission.start_m(vehicle), target)
-        for vehicle, target in zip(mission.vehicles, targets, strict=True)
+        route_of(mission, vehicle, stops) for vehicle, stops in zip(mission.vehicles, targets, strict=True) if stops
     ]
+
+
+def route_of(mission: Mission, vehicle: Vehicle, targets: tuple[Target, ...]) -> Route:
+    """The route of a vehicle to its targets."""
+    return Route(vehicle.name, vehicle.sysid, mission.start_m(vehicle), targets)
+
+
+def one_each(table_m: Array) -> list[list[int]]:
+    """At most one target per vehicle, as many as there can be, the lengths in total least (Kuhn and Munkres)."""
+    n_vehicles = len(table_m) - table_m.shape[1]
+    routes: list[list[int]] = [[] for _ in range(n_vehicles)]
+    for vehicle, target in zip(*linear_sum_assignment(table_m[:n_vehicles]), strict=True):
+        routes[vehicle].append(int(target))
+    return routes
+
+
+def shortest(table_m: Array, solve: Solve, way_lengths: Callable[[list[Leg]], Array]) -> list[list[int]]:
+    """Routes that are best with the true lengths of the ways.
+
+    Args:
+        table_m: (vehicles + targets, targets) lower bounds of the lengths; those of ways that are used are set right.
+        solve: finds the best routes for a table.
+        way_lengths: (k,) true lengths of k legs.
+    """
+    known: set[Leg] = set()
+    while True:
+        routes = solve(table_m)
+        new = [leg for leg in legs(routes) if leg not in known]
+        if not new:
+            return routes
+        table_m[tuple(np.array(new).T)] = way_lengths(new)
+        known.update(new)
+
+
+def legs(routes: Sequence[Sequence[int]]) -> list[Leg]:
+    """The legs that routes consist of."""
+    n = len(routes)
+    return [
+        (before, target)
+        for vehicle, route in enumerate(routes)
+        for before, target in zip([vehicle, *(n + target for target in route)], route, strict=False)
+    ]
+
+
+def _chosen(mission: Mission) -> list[list[int]]:
+    """Indices of the targets of each vehicle."""
+    starts_m = np.array([mission.start_m(vehicle) for vehicle in mission.vehicles])
+    targets_m = np.array([target.position_m for target in mission.targets])
+    if len(targets_m) <= len(starts_m) and mission.launch_point_m is not None:
+        return one_each(np.concatenate((_from_pads(mission, targets_m), np.zeros((len(targets_m),) * 2))))
+    table_m = lengths(np.concatenate((starts_m, targets_m))[:, None] - targets_m)
+
+    sides_m = SIDES * table_m**2 / max(float(table_m.max()), 1e-9)
+
+    def way_lengths(wanted: list[Leg]) -> Array:
+        return _way_lengths(mission, wanted)
+
+    def one_each_on_its_side(table_m: Array) -> list[list[int]]:
+        return one_each(table_m + sides_m)
+
+    return shortest(table_m, one_each_on_its_side if len(targets_m) <= len(starts_m) else balanced_routes, way_lengths)
+
+
+def _from_pads(mission: Mission, targets_m: Array) -> Array:
+    """(vehicles, targets) squares of the distances from the pads, for vehicles with a common launch point.
+
+    All ways are equally long for all vehicles. With the least sum of squares no two vehicles have to change sides on
+    their way from the pads to the curves: (p_i - p_j) . (q_i - q_j) >= 0 (Turpin, Michael and Kumar 2014).
+    """
+    pads_m = np.array([vehicle.pad_m for vehicle in mission.vehicles])
+    return np.sum((pads_m[:, None] - targets_m) ** 2, axis=2)
+
+
+def _way_lengths(mission: Mission, wanted: list[Leg]) -> Array:
+    """(k,) lengths [m] of the shortest curves that keep the limits, or of paths through what is in the way."""
+    n, vehicles, targets = len(mission.vehicles), mission.vehicles, mission.targets
+    routes = [
+        route_of(mission, vehicles[begin], (targets[end],))
+        if begin < n
+        else Route(targets[begin - n].name, 0, np.array(targets[begin - n].position_m), (targets[end],))
+        for begin, end in wanted
+    ]
+    found_m = _bent(mission, routes)
+    for index in np.flatnonzero(np.isinf(found_m)):
+        path_m = guide_path(mission, routes[index].start_m, routes[index].places_m[-1])
+        found_m[index] = np.inf if path_m is None else path_lengths(path_m)
+    return np.where(found_m <= path_limit_m(mission), found_m, UNREACHABLE_M)
+
+
+def _bent(mission: Mission, routes: list[Route]) -> Array:
+    """(k,) lengths [m] of the shortest bow of each route that keeps its limits, infinite where none does."""
+    problem = pose(mission, routes, guides(mission, routes))
+    by_length = problem.terms._replace(length_weight=1.0, clearance_weight=0.0, height_weight=0.0, slow_cost=0.0)
+    problem = problem._replace(terms=by_length)
+    first = bows(problem.base_m.shape[1])
+    length_m, violation = np.empty((2, len(routes), len(first)))
+    for index in range(len(routes)):
+        swarm_cost(problem, index, first, no_others(), length_m[index], violation[index])
+    return np.where(violation < FLYABLE, length_m, np.inf).min(axis=1)

@@ -36,7 +36,7 @@ def judged(mission: Mission, routes: Sequence[Route], controls_m: Array) -> Cand
     clearance_m = np.array([obstacles.clearance(curve_m, solid) for curve_m in curves_m])
     timing = common_timing(mission, curves_m, clearance_m)
     curves = tuple(
-        TimedCurve(route.name, route.sysid, route.target, curve_m, timing.times_s)
+        TimedCurve(route.name, route.sysid, route.targets, curve_m, timing.times_s)
         for route, curve_m in zip(routes, curves_m, strict=True)
     )
     found = feasibility.violations(mission, curves)
@@ -49,10 +49,10 @@ def vehicle_plans(mission: Mission, candidate: Candidate) -> tuple[VehiclePlan, 
         VehiclePlan(
             name=curve.name,
             sysid=curve.sysid,
-            target=curve.target,
+            targets=curve.targets,
             curve_m=curve.curve_m,
             times_s=curve.times_s,
-            track=sample_track(mission, curve.curve_m, candidate.timing),
+            track=sample_track(mission, curve.curve_m, candidate.timing, curve.stops_m),
             length_m=float(path_lengths(curve.curve_m)),
         )
         for curve in candidate.curves

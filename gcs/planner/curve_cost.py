@@ -108,6 +108,7 @@ def curve_cost(
     samples: Sampling,
     terms: Terms,
     obstacles: Obstacles,
+    zones_m: Array,
     points_m: Array,
     chords_m: Array,
     adjoint: Adjoint,
@@ -119,6 +120,7 @@ def curve_cost(
         samples: the m samples.
         terms: weights and limits.
         obstacles: what is known to stand in the world.
+        zones_m: (z, 3) centres of the launch and landing zones.
         points_m: (m, 3) is filled with the samples.
         chords_m: (m - 1,) is filled with the distances between them.
         adjoint: is overwritten with the derivatives of objective + penalty_weight * violations; none are computed
@@ -131,7 +133,7 @@ def curve_cost(
     heights(points_m, obstacles, height)
     over = max(0.0, length / terms.length_m - 1.0)
     violation = over * over
-    violation += _judge_points(points_m, terms, clearance, height, reward, adjoint.point, with_gradient)
+    violation += _judge_points(points_m, terms, zones_m, clearance, height, reward, adjoint.point, with_gradient)
     violation += _judge_shape(control_m, samples, terms, adjoint.slope, adjoint.bend, with_gradient)
     earned = 0.0
     for m in range(n_samples - 1):
@@ -193,6 +195,7 @@ def pull_back(samples: Sampling, points_m: Array, chords_m: Array, adjoint: Adjo
 def _judge_points(
     points_m: Array,
     terms: Terms,
+    zones_m: Array,
     clearance: Array,
     height: Array,
     reward: Array,
@@ -204,11 +207,12 @@ def _judge_points(
     push = 2.0 * terms.penalty_weight / unit_m
     zone_squared = terms.zone_radius_m * terms.zone_radius_m
     for m in range(last + 1):
-        from_start = from_target = 0.0
-        for axis in range(3):
-            from_start += (points_m[m, axis] - points_m[0, axis]) ** 2
-            from_target += (points_m[m, axis] - points_m[last, axis]) ** 2
-        in_zone = min(from_start, from_target) < zone_squared
+        in_zone = False
+        for z in range(len(zones_m)):
+            away = 0.0
+            for axis in range(3):
+                away += (points_m[m, axis] - zones_m[z, axis]) ** 2
+            in_zone |= away < zone_squared
         short = max(0.0, (terms.contact_m if in_zone else terms.clearance_m) - clearance[m, 0]) / unit_m
         low = max(0.0, (0.0 if in_zone else terms.height_m) - height[m, 0]) / unit_m
         violation += short * short + low * low

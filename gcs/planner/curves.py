@@ -56,6 +56,15 @@ def lengths(vectors: Array) -> Array:
     return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
+def passing_samples(curve_m: Array, stops_m: Array) -> list[int]:
+    """Indices of the samples of an (m, 3) curve that are nearest to (k, 3) places passed one after the other."""
+    passed: list[int] = []
+    for stop_m in stops_m:
+        after = passed[-1] if passed else 0
+        passed.append(after + int(np.argmin(lengths(curve_m[after:] - stop_m))))
+    return passed
+
+
 def curvature(curve_m: Array) -> Array:
     """(m,) curvature [1/m] of a densely sampled (m, 3) curve: of the circle through each sample and its neighbours."""
     steps = np.diff(curve_m, axis=0)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gcs.planner.curves import curvature, lengths, path_lengths
+from gcs.planner.curves import curvature, lengths, passing_samples, path_lengths
 from gcs.planner.limits import flight_box, join_distance_m
 from gcs.planner.plan import Limit, TimedCurve, Violation
 from missions import obstacles
@@ -34,14 +34,14 @@ class _Fleet:
         times_s: (m,) since T0.
         near_start: (vehicles, m) in the zone around the launch point: separation rests there, contact does not ...
         joined: (vehicles, m) ... once a vehicle has joined its curve from its pad.
-        near_end: (vehicles, m) in the zone around the target: clearance and height rest in both zones.
+        near_target: (vehicles, m) in the zone around a target: clearance and height rest in all zones.
     """
 
     places_m: Array
     times_s: Array
     near_start: BoolArray
     joined: BoolArray
-    near_end: BoolArray
+    near_target: BoolArray
 
 
 def violations(mission: Mission, vehicles: Sequence[TimedCurve]) -> tuple[Violation, ...]:
@@ -54,7 +54,8 @@ def violations(mission: Mission, vehicles: Sequence[TimedCurve]) -> tuple[Violat
     found: list[Violation] = []
     for index, vehicle in enumerate(vehicles):
         found += _ends(mission, vehicle)
-        found += _near_things(mission, vehicle, fleet.near_start[index] | fleet.near_end[index])
+        found += _passed(mission, vehicle)
+        found += _near_things(mission, vehicle, fleet.near_start[index] | fleet.near_target[index])
         found += _outside(mission, vehicle)
         found += _shape(mission, vehicle)
         found += _reach(mission, vehicle)
@@ -76,9 +77,14 @@ def _assemble(mission: Mission, vehicles: Sequence[TimedCurve]) -> _Fleet:
             )
     places_m = np.array([vehicle.curve_m for vehicle in vehicles])
     flown_m = lengths(places_m - places_m[:, :1])
-    ahead_m = lengths(places_m - places_m[:, -1:])
+    to_target_m = np.array([_to_targets(vehicle) for vehicle in vehicles])
     radius_m = mission.launch_zone_radius_m
-    return _Fleet(places_m, times_s, flown_m < radius_m, flown_m > join_distance_m(mission), ahead_m < radius_m)
+    return _Fleet(places_m, times_s, flown_m < radius_m, flown_m > join_distance_m(mission), to_target_m < radius_m)
+
+
+def _to_targets(vehicle: TimedCurve) -> Array:
+    """(m,) distance of every sample to the nearest of the vehicle's targets."""
+    return np.min([lengths(vehicle.curve_m - np.array(target.position_m)) for target in vehicle.targets], axis=0)
 
 
 def _ends(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
@@ -90,6 +96,17 @@ def _ends(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
         off_m = float(np.linalg.norm(found_m - wanted_m))
         if off_m > ROUNDING:
             yield Violation(vehicle.name, limit, "", off_m, 0.0)
+
+
+def _passed(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
+    """The targets on the way are passed in their order, as near as the distance of two samples."""
+    stops_m = vehicle.stops_m
+    near_m = SPACING_M[mission.site]
+    for target, stop_m, index in zip(vehicle.targets, stops_m, passing_samples(vehicle.curve_m, stops_m), strict=False):
+        off_m = float(np.linalg.norm(vehicle.curve_m[index] - stop_m))
+        if off_m > near_m:
+            where = f"({target.name}) {_at(vehicle.curve_m[index], float(vehicle.times_s[index]))}"
+            yield Violation(vehicle.name, Limit.ROUTE, where, off_m, near_m)
 
 
 def _near_things(mission: Mission, vehicle: TimedCurve, in_zone: BoolArray) -> Iterator[Violation]:

@@ -19,6 +19,7 @@ from missions.kernels import compiled
 from missions.obstacles import Obstacles
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 
 class Problem(NamedTuple):
@@ -28,6 +29,12 @@ class Problem(NamedTuple):
     """(vehicles, n, 3) control points without any offset, start and target included."""
     axes_m: Array
     """(vehicles, n - 2, 2, 3) what an inner control point moves by when its lateral, vertical offset is one."""
+    pins: IntArray
+    """(vehicles, k) control points that follow from their neighbours, so that the curve passes targets; 0 for none."""
+    pin_weights: Array
+    """(n, 3) what a pinned control point and its neighbours weigh where the curve passes."""
+    zones_m: Array
+    """(vehicles, k + 2, 3) start and targets of each, the last one repeated: centres of launch and landing zones."""
     samples: Sampling
     terms: Terms
     coupling: Coupling
@@ -54,19 +61,25 @@ def all_control_points(problem: Problem, offsets: Array) -> Array:
     """(vehicles, n, 3) control points, ENU [m], of a plan with (vehicles, 2 (n - 2)) offsets."""
     controls = np.empty_like(problem.base_m)
     for vehicle, row in enumerate(offsets):
-        control_points(problem.base_m[vehicle], problem.axes_m[vehicle], row, controls[vehicle])
+        control_points(problem, vehicle, row, controls[vehicle])
     return controls
 
 
 @compiled
-def control_points(base_m: Array, axes_m: Array, offsets: Array, out_m: Array) -> None:
+def control_points(problem: Problem, vehicle: int, offsets: Array, out_m: Array) -> None:
     """Fill (n, 3) control points of one vehicle's curve with (2 (n - 2),) offsets."""
+    base_m, axes_m, weights = problem.base_m[vehicle], problem.axes_m[vehicle], problem.pin_weights
     last = len(out_m) - 1
     for axis in range(3):
         out_m[0, axis], out_m[last, axis] = base_m[0, axis], base_m[last, axis]
         for i in range(last - 1):
             moved = offsets[2 * i] * axes_m[i, 0, axis] + offsets[2 * i + 1] * axes_m[i, 1, axis]
             out_m[i + 1, axis] = base_m[i + 1, axis] + moved
+        for j in range(problem.pins.shape[1]):
+            c = problem.pins[vehicle, j]
+            if c > 0:
+                beside = weights[c, 0] * out_m[c - 1, axis] + weights[c, 2] * out_m[c + 1, axis]
+                out_m[c, axis] = (problem.zones_m[vehicle, 1 + j, axis] - beside) / weights[c, 1]
 
 
 @compiled
@@ -84,15 +97,14 @@ def swarm_cost(
         violation: (particles,) is filled with the sum of all squared violations that this vehicle has a part in.
     """
     n_samples, n_fractions = len(problem.samples.first), context.places_m.shape[1]
-    base_m, axes_m = problem.base_m[vehicle], problem.axes_m[vehicle]
-    control = np.empty_like(base_m)
+    control, zones_m = np.empty_like(problem.base_m[vehicle]), problem.zones_m[vehicle]
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
     places, side, share = np.empty((n_fractions, 3)), np.empty(n_fractions, np.int64), np.empty(n_fractions)
     unwanted = new_adjoint(0)
     for i in range(len(offsets)):
-        control_points(base_m, axes_m, offsets[i], control)
+        control_points(problem, vehicle, offsets[i], control)
         objective[i], violation[i] = curve_cost(
-            control, problem.samples, problem.terms, problem.obstacles, points, chords, unwanted
+            control, problem.samples, problem.terms, problem.obstacles, zones_m, points, chords, unwanted
         )
         if len(context.places_m) > 1:
             step = at_fractions(points, chords, places, side, share)
@@ -104,7 +116,7 @@ def set_context(problem: Problem, vehicle: int, offsets: Array, context: Context
     n_samples, n_fractions = len(problem.samples.first), context.places_m.shape[1]
     control = np.empty_like(problem.base_m[vehicle])
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
-    control_points(problem.base_m[vehicle], problem.axes_m[vehicle], offsets, control)
+    control_points(problem, vehicle, offsets, control)
     place_samples(control, problem.samples, points, chords)
     places, side, share = context.places_m[vehicle], np.empty(n_fractions, np.int64), np.empty(n_fractions)
     context.steps_m[vehicle] = at_fractions(points, chords, places, side, share)
@@ -133,10 +145,17 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
     steps = np.empty(n_vehicles)
     objective = violation = 0.0
     for i in range(n_vehicles):
-        control_points(problem.base_m[i], problem.axes_m[i], offsets[i], control)
+        control_points(problem, i, offsets[i], control)
         adjoint = Adjoint(by_point[i], by_slope[i], by_bend[i], by_chord[i])
         cost, broken = curve_cost(
-            control, problem.samples, problem.terms, problem.obstacles, points[i], chords[i], adjoint
+            control,
+            problem.samples,
+            problem.terms,
+            problem.obstacles,
+            problem.zones_m[i],
+            points[i],
+            chords[i],
+            adjoint,
         )
         objective, violation = objective + cost, violation + broken
         steps[i] = at_fractions(points[i], chords[i], places[i], side[i], share[i])
@@ -146,7 +165,7 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
         from_fractions(points[i], chords[i], side[i], share[i], by_place[i], by_point[i], by_chord[i])
         adjoint = Adjoint(by_point[i], by_slope[i], by_bend[i], by_chord[i])
         pull_back(problem.samples, points[i], chords[i], adjoint, control)
-        _to_offsets(control, problem.axes_m[i], gradient[i])
+        _to_offsets(control, problem.axes_m[i], problem.pins[i], problem.pin_weights, gradient[i])
     return objective, violation
 
 
@@ -170,7 +189,14 @@ def plan_costs(problem: Problem, controls_m: Array, objective: Array, violation:
         objective[plan] = violation[plan] = 0.0
         for i in range(n_vehicles):
             cost, broken = curve_cost(
-                controls_m[plan, i], problem.samples, problem.terms, problem.obstacles, points, chords, unwanted
+                controls_m[plan, i],
+                problem.samples,
+                problem.terms,
+                problem.obstacles,
+                problem.zones_m[i],
+                points,
+                chords,
+                unwanted,
             )
             objective[plan], violation[plan] = objective[plan] + cost, violation[plan] + broken
             steps[i] = at_fractions(points, chords, places[i], side, share)
@@ -179,8 +205,14 @@ def plan_costs(problem: Problem, controls_m: Array, objective: Array, violation:
 
 
 @compiled
-def _to_offsets(by_control: Array, axes_m: Array, gradient: Array) -> None:
-    """Derivatives by offsets from (n, 3) derivatives by control points."""
+def _to_offsets(by_control: Array, axes_m: Array, pins: IntArray, weights: Array, gradient: Array) -> None:
+    """Derivatives by offsets from (n, 3) derivatives by control points, which are overwritten."""
+    for c in pins:
+        if c > 0:
+            for axis in range(3):
+                by_control[c - 1, axis] -= weights[c, 0] / weights[c, 1] * by_control[c, axis]
+                by_control[c + 1, axis] -= weights[c, 2] / weights[c, 1] * by_control[c, axis]
+                by_control[c, axis] = 0.0
     for i in range(len(axes_m)):
         for j in range(2):
             gradient[2 * i + j] = 0.0

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from gcs.planner.curves import lengths
 from gcs.planner.limits import flight_box
+from gcs.planner.problem import Route, Way
 from missions import obstacles
 from missions.mission import Mission
 from missions.obstacles import Obstacles
@@ -54,6 +55,23 @@ class _Errand:
         clear = obstacles.clearance(points_m, self.solid) >= np.where(in_zone, limits.body_radius_m, self.clearance_m)
         height_m = points_m[:, 2] - obstacles.terrain_height(points_m, self.solid)
         return clear & (height_m >= np.where(in_zone, 0.0, limits.height_m))
+
+
+def guide_way(mission: Mission, route: Route, wider: float = 1.0) -> Way | None:
+    """A way from target to target along guide paths; None where one of them cannot be reached from the one before it.
+
+    Args:
+        mission: world and limits.
+        route: of one vehicle.
+        wider: factor on the limit of clearance.
+    """
+    legs_m = [guide_path(mission, begin_m, end_m, wider) for begin_m, end_m in itertools.pairwise(route.places_m)]
+    paths_m = [leg_m for leg_m in legs_m if leg_m is not None]
+    if len(paths_m) < len(legs_m):
+        return None
+    corners_m = np.concatenate((route.start_m[None], *(path_m[1:] for path_m in paths_m)))
+    ends = np.cumsum([len(path_m) - 1 for path_m in paths_m])
+    return Way(corners_m, tuple(ends[:-1].tolist()))
 
 
 def guide_path(mission: Mission, start_m: Array, target_m: Array, wider: float = 1.0) -> Array | None:

@@ -32,6 +32,7 @@ class Limit(Enum):
     GREATEST_MEAN_SEPARATION = ("mean separation", "m", "at most")
     START = ("distance of the beginning from the launch point", "m", "at most")
     TARGET = ("distance of the end from the target", "m", "at most")
+    ROUTE = ("distance from a target on the way", "m", "at most")
 
     @property
     def title(self) -> str:
@@ -100,17 +101,27 @@ class TimedCurve:
     Args:
         name: of the vehicle.
         sysid: its MAVLink system id.
-        target: where it goes.
-        curve_m: (m, 3) ENU samples from the launch point to the target, equally spaced along the curve; sample i of
-            all vehicles is passed at the same time.
+        targets: where it goes, in flying order.
+        curve_m: (m, 3) ENU samples from the launch point to the last target, equally spaced along the curve; sample i
+            of all vehicles is passed at the same time.
         times_s: (m,) seconds since the common start T0 at which they are passed.
     """
 
     name: str
     sysid: int
-    target: Target
+    targets: tuple[Target, ...]
     curve_m: Array
     times_s: Array
+
+    @property
+    def target(self) -> Target:
+        """Where it arrives."""
+        return self.targets[-1]
+
+    @property
+    def stops_m(self) -> Array:
+        """(k, 3) the targets that it passes on the way."""
+        return np.array([target.position_m for target in self.targets[:-1]], dtype=float).reshape(-1, 3)
 
 
 @dataclass(frozen=True)
@@ -124,6 +135,13 @@ class VehiclePlan(TimedCurve):
 
     track: Track
     length_m: float
+
+    @property
+    def targets_alone(self) -> Track:
+        """The targets without the track points between them, for a companion that plans its way itself."""
+        stops_m = np.array([target.position_m for target in self.targets])
+        kept = [int(np.argmin(np.linalg.norm(self.track.points_m - stop_m, axis=1))) for stop_m in stops_m]
+        return Track(self.track.points_m[kept], self.track.speeds_m_s[kept])
 
 
 @dataclass(frozen=True)
@@ -141,7 +159,8 @@ class FleetPlan:
         feasible: whether the judge (`feasibility`) found no violation.
         violations: what it found.
         convergence: the progress after each iteration.
-        vehicles: in the order of the mission.
+        vehicles: those that fly, in the order of the mission.
+        staying: names of the vehicles that get no target and stay on their pads.
     """
 
     mission: str
@@ -155,6 +174,7 @@ class FleetPlan:
     violations: tuple[Violation, ...]
     convergence: tuple[Progress, ...]
     vehicles: tuple[VehiclePlan, ...]
+    staying: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """The plan as `gcs plan --output x.json` writes it; `convergence` is the best objective of each iteration."""
@@ -163,6 +183,7 @@ class FleetPlan:
         document["violations"] = [_violation_as_json(violation) for violation in self.violations]
         document["convergence"] = [progress.objective for progress in self.convergence]
         document["vehicles"] = [_vehicle_as_json(vehicle) for vehicle in self.vehicles]
+        document["staying"] = list(self.staying)
         return json.dumps(document)
 
 
@@ -185,6 +206,7 @@ def _vehicle_as_json(vehicle: VehiclePlan) -> dict[str, Any]:
     return {
         "name": vehicle.name,
         "target": vehicle.target.name,
+        "targets": [target.name for target in vehicle.targets],
         "track_points_enu_m": vehicle.track.points_m.round(JSON_DECIMALS).tolist(),
         "curve_enu_m": vehicle.curve_m.round(JSON_DECIMALS).tolist(),
         "length_m": vehicle.length_m,

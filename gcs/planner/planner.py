@@ -44,17 +44,18 @@ def plan_mission(
 
     Raises:
         UsageError: there is no such algorithm.
-        InfeasibleMission: vehicles and targets do not go together.
     """
     if algorithm not in ALGORITHMS:
         raise UsageError(f"--algorithm {algorithm}: expected one of {', '.join(ALGORITHMS)}")
     began_cpu_s = time.thread_time()
     budget = new_budget(evaluations, budget_s, clock, should_stop)
+    routes = allocate(mission)
+    flying = {route.name for route in routes}
     listener = on_progress or (lambda _: None)
     if algorithm in BASELINES:
-        search = BaselineSearch(mission, allocate(mission), seed, budget, listener, algorithm)
+        search = BaselineSearch(mission, routes, seed, budget, listener, algorithm)
     else:
-        search = FleetSearch(mission, allocate(mission), seed, budget, listener)
+        search = FleetSearch(mission, routes, seed, budget, listener)
     found = search.run()
     return FleetPlan(
         mission=mission.name,
@@ -68,6 +69,7 @@ def plan_mission(
         violations=found.violations,
         convergence=tuple(search.convergence),
         vehicles=vehicle_plans(mission, found),
+        staying=tuple(vehicle.name for vehicle in mission.vehicles if vehicle.name not in flying),
     )
 
 

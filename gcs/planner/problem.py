@@ -1,5 +1,6 @@
 """A mission as the search sees it: arrays for the compiled costs, its limits tightened by a margin."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from gcs.planner import limits
 from gcs.planner.coupling import Coupling
 from gcs.planner.curve_cost import Terms, sampling
 from gcs.planner.fleet_cost import Problem
-from gcs.planner.representation import Guide, guide_along, straight_guide
+from gcs.planner.representation import LEG_SEGMENTS, Guide, guide_along, pin_weights
 from missions import obstacles, time_law
 from missions.mission import Mission, Target
 
@@ -22,11 +23,24 @@ PENALTY = 0.3
 MEAN_UNIT_SHARE = 0.1
 """A mean separation that is off by this share of its upper bound, or of the mission's size, is a violation of one."""
 
-POINTS_PER_CORNER = 3
 MOST_CONTROL_POINTS = 24
+"""Of curves that follow a guide path; targets on the way come on top of what the mission says."""
 
 FRACTIONS = 48
 """Fractions of the paths at which vehicles are compared."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A polygon from a start through all targets of one vehicle.
+
+    Args:
+        corners_m: (m, 3) ENU.
+        stops: indices of the corners that are targets on the way.
+    """
+
+    corners_m: Array
+    stops: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -37,16 +51,23 @@ class Route:
     sysid: int
     start_m: Array
     """(3,) ENU."""
-    target: Target
+    targets: tuple[Target, ...]
+    """In flying order, one at least."""
 
     @property
-    def target_m(self) -> Array:
-        return np.array(self.target.position_m)
+    def places_m(self) -> Array:
+        """(1 + k, 3) start and targets."""
+        return np.concatenate((self.start_m[None], [target.position_m for target in self.targets]))
+
+    @property
+    def straight(self) -> Way:
+        """From place to place without a bend."""
+        return Way(self.places_m, tuple(range(1, len(self.targets))))
 
     @property
     def direct_m(self) -> float:
-        """Length of the straight line."""
-        return float(np.linalg.norm(self.target_m - self.start_m))
+        """Length of the straight way."""
+        return float(time_law.arc_length(self.places_m)[-1])
 
 
 @dataclass(frozen=True)
@@ -70,35 +91,48 @@ class Care:
         return Care(2 * self.samples, 2.0 * self.distance_share, 2.0 * self.share, 2.0 * self.turn_share)
 
 
-def guides(
-    mission: Mission, routes: list[Route], paths_m: list[Array | None] | None = None, n_control: int | None = None
-) -> list[Guide]:
-    """What offsets are counted from: the straight line of every route, or the (m, 3) path that it is given."""
-    n, bounds = n_control or mission.planner.control_points, mission.world.bounds
-    return [
-        straight_guide(route.start_m, route.target_m, n, bounds) if path is None else guide_along(path, n, bounds)
-        for route, path in zip(routes, paths_m or [None] * len(routes), strict=True)
-    ]
+def guides_along(mission: Mission, ways: Sequence[Way], n_control: int) -> list[Guide]:
+    """What offsets are counted from, for curves with so many control points."""
+    return [guide_along(way.corners_m, n_control, mission.world.bounds, way.stops) for way in ways]
 
 
-def control_points(mission: Mission, corners: int) -> int:
-    """Control points of curves along a path with so many corners: as the mission says, or enough to follow it."""
-    return max(mission.planner.control_points, min(POINTS_PER_CORNER * corners, MOST_CONTROL_POINTS))
+def guides(mission: Mission, routes: Sequence[Route]) -> list[Guide]:
+    """Guides that lead straight from target to target."""
+    ways = [route.straight for route in routes]
+    return guides_along(mission, ways, control_points(mission, ways))
 
 
-def pose(mission: Mission, routes: list[Route], guides: list[Guide], care: Care = Care()) -> Problem:
+def control_points(mission: Mission, ways: Sequence[Way], per_corner: int = 0) -> int:
+    """Control points of curves along such ways: as the mission says, more for many targets or to follow corners."""
+    most_stops = max(len(way.stops) for way in ways)
+    enough = mission.planner.control_points + (LEG_SEGMENTS + 1) * most_stops
+    corners = max(len(way.corners_m) for way in ways)
+    return max(enough, min(per_corner * corners, MOST_CONTROL_POINTS))
+
+
+def pose(mission: Mission, routes: Sequence[Route], guides: Sequence[Guide], care: Care = Care()) -> Problem:
     """The arrays that the compiled costs read."""
+    n_control = len(guides[0].base_m)
+    most_pins = max(len(guide.pins) for guide in guides)
+    pins, zones_m = np.zeros((len(routes), most_pins), np.int64), np.empty((len(routes), most_pins + 2, 3))
+    for index, (route, guide) in enumerate(zip(routes, guides, strict=True)):
+        pins[index, : len(guide.pins)] = guide.pins
+        places_m = route.places_m
+        zones_m[index, : len(places_m)], zones_m[index, len(places_m) :] = places_m, places_m[-1]
     return Problem(
         base_m=np.array([guide.base_m for guide in guides]),
         axes_m=np.array([guide.axes_m for guide in guides]),
-        samples=sampling(len(guides[0].base_m), care.samples),
+        pins=pins,
+        pin_weights=pin_weights(n_control),
+        zones_m=zones_m,
+        samples=sampling(n_control, care.samples * -(-n_control // MOST_CONTROL_POINTS)),
         terms=_terms(mission, routes, care),
         coupling=_coupling(mission, routes, care),
         obstacles=obstacles.pack(mission.world.as_known()),
     )
 
 
-def _terms(mission: Mission, routes: list[Route], care: Care) -> Terms:
+def _terms(mission: Mission, routes: Sequence[Route], care: Care) -> Terms:
     kept, weights = mission.limits, mission.planner
     straight_cost = weights.length_weight * _mean_direct_m(routes)
     unit_m = max(kept.clearance_m, kept.body_radius_m)
@@ -131,7 +165,7 @@ def _terms(mission: Mission, routes: list[Route], care: Care) -> Terms:
     )
 
 
-def _coupling(mission: Mission, routes: list[Route], care: Care) -> Coupling:
+def _coupling(mission: Mission, routes: Sequence[Route], care: Care) -> Coupling:
     kept = mission.limits
     mean_low_m, mean_high_m = kept.mean_separation_m
     longest_m = max(route.direct_m for route in routes)
@@ -150,13 +184,13 @@ def _coupling(mission: Mission, routes: list[Route], care: Care) -> Coupling:
     )
 
 
-def _mean_direct_m(routes: list[Route]) -> float:
+def _mean_direct_m(routes: Sequence[Route]) -> float:
     return max(float(np.mean([route.direct_m for route in routes])), 1e-3)
 
 
-def _inside(box_m: tuple[Array, Array], margin_m: float, routes: list[Route]) -> tuple[Array, Array]:
+def _inside(box_m: tuple[Array, Array], margin_m: float, routes: Sequence[Route]) -> tuple[Array, Array]:
     """The box drawn in by a margin, but not past any start or target."""
-    ends = np.array([route.start_m for route in routes] + [route.target_m for route in routes])
+    ends = np.concatenate([route.places_m for route in routes])
     return np.minimum(box_m[0] + margin_m, ends.min(axis=0)), np.maximum(box_m[1] - margin_m, ends.max(axis=0))
 
 

@@ -4,15 +4,18 @@ Each inner control point may move sideways and up or down, seen along the guide 
 search range, the `reach`. Nothing moves along the path. All offsets zero is the guide path itself, flown evenly.
 """
 
+import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from missions import bspline
+from missions import bspline, time_law
 from missions.world import Bounds
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 UP = np.array([0.0, 0.0, 1.0])
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
@@ -27,6 +30,10 @@ MOST_SKEW = 2.0
 """Fresh bows 4 s (1 - s) are bent by s = t^p, p from 1 / 2 to 2: widest after 25 % to 71 % of the way."""
 
 
+LEG_SEGMENTS = 3
+"""The curve between two targets of one vehicle has at least so many polynomial segments."""
+
+
 @dataclass(frozen=True)
 class Guide:
     """The guide path of one vehicle: (n, 3) control points without offsets, and what offsets of one move them by.
@@ -34,30 +41,64 @@ class Guide:
     Args:
         base_m: (n, 3) ENU, start and target included.
         axes_m: (n - 2, 2, 3) lateral and vertical axis of each inner control point, as long as the reach.
+        pins: (k,) indices of the control points that follow from their neighbours, because the curve passes the
+            targets on the way at the knots in the middle of what these control points touch.
     """
 
     base_m: Array
     axes_m: Array
+    pins: IntArray
 
 
+@functools.lru_cache(maxsize=64)
 def abscissae(n_control: int) -> Array:
     """(n,) Greville abscissae: control points there on a straight line give a curve that is flown evenly."""
     knots = bspline.clamped_knots(n_control)
-    return np.array([knots[i + 1 : i + 1 + bspline.DEGREE].mean() for i in range(n_control)])
+    where = np.lib.stride_tricks.sliding_window_view(knots[1:-1], bspline.DEGREE).mean(axis=1)
+    where.flags.writeable = False
+    return where
 
 
-def straight_guide(start_m: Array, target_m: Array, n_control: int, bounds: Bounds) -> Guide:
-    """The straight line from start to target."""
-    base = start_m + abscissae(n_control)[:, None] * (target_m - start_m)
-    return Guide(base, _axes(np.tile(target_m - start_m, (n_control - 2, 1)), base, bounds))
+@functools.lru_cache(maxsize=64)
+def pin_weights(n_control: int) -> Array:
+    """(n, 3) what each control point and its two neighbours weigh at the knot in the middle of what it touches.
+
+    Rows of the outer two control points at each end, where there is no such knot, are zero.
+    """
+    weights = np.zeros((n_control, 3))
+    inner = np.arange(2, n_control - 2)
+    rows = bspline.basis(n_control, (inner - 1) / (n_control - bspline.DEGREE))
+    weights[2:-2] = np.take_along_axis(rows, inner[:, None] + np.array([-1, 0, 1]), axis=1)
+    weights.flags.writeable = False
+    return weights
 
 
-def guide_along(path_m: Array, n_control: int, bounds: Bounds) -> Guide:
-    """A guide along an (m, 3) polygon: control points at equal steps of its length, axes across its direction."""
-    lengths = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(path_m, axis=0), axis=1))))
-    where = abscissae(n_control) * lengths[-1]
-    base = np.stack([np.interp(where, lengths, path_m[:, axis]) for axis in range(3)], axis=-1)
-    return Guide(base, _axes(base[2:] - base[:-2], base, bounds))
+def guide_along(path_m: Array, n_control: int, bounds: Bounds, stops: Sequence[int] = ()) -> Guide:
+    """A guide along an (m, 3) polygon: control points at equal steps of its legs, axes across its direction.
+
+    Args:
+        path_m: (m, 3) corners from start to last target.
+        n_control: n.
+        bounds: offsets reach no farther than these are wide.
+        stops: indices of the corners on the way that are targets themselves; they divide the path into legs.
+    """
+    lengths_m = time_law.arc_length(path_m)
+    legs_m = lengths_m[[0, *stops, len(path_m) - 1]]
+    segments = n_control - bspline.DEGREE
+    knots = np.concatenate(([0], np.cumsum(_shared(segments, np.diff(legs_m)))))
+    where_m = np.interp(abscissae(n_control) * segments, knots, legs_m)
+    base_m = time_law.resample(path_m, lengths_m, where_m)
+    return Guide(base_m, _axes(base_m[2:] - base_m[:-2], base_m, bounds), knots[1:-1].astype(np.int64) + 1)
+
+
+def _shared(segments: int, legs_m: Array) -> IntArray:
+    """(k,) how many of the curve's segments each leg gets: as its length, but at least `LEG_SEGMENTS`."""
+    spare = segments - LEG_SEGMENTS * len(legs_m)
+    if len(legs_m) > 1 and spare < 0:
+        raise ValueError(f"{len(legs_m)} legs need {LEG_SEGMENTS * len(legs_m)} segments, found {segments}")
+    ideal = spare * np.cumsum(legs_m) / max(float(legs_m.sum()), 1e-9)
+    ideal[-1] = spare
+    return LEG_SEGMENTS + np.diff(np.round(ideal).astype(np.int64), prepend=0)
 
 
 def bows(n_control: int) -> Array:

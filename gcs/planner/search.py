@@ -16,9 +16,9 @@ from gcs.planner.budget import Budget
 from gcs.planner.cooperation import Cooperation
 from gcs.planner.ecpso import EcpsoSettings
 from gcs.planner.fleet_cost import all_control_points
-from gcs.planner.guide_path import guide_path
+from gcs.planner.guide_path import guide_way
 from gcs.planner.plan import Progress
-from gcs.planner.problem import Care, Route, control_points, guides, pose
+from gcs.planner.problem import Care, Route, Way, control_points, guides, guides_along, pose
 from gcs.planner.refinement import Refined, Stage, refine
 from missions.mission import Mission
 
@@ -42,6 +42,8 @@ AFRESH_EVALUATIONS = 300
 """With fewer evaluations left the search does not start afresh."""
 WIDER = 1.25
 """A new guide path keeps so many times farther away than the one before it."""
+POINTS_PER_CORNER = 3
+"""Control points of curves along guide paths, at first."""
 MERIT_STRICTNESS = 100.0
 """Two polished plans are compared with violations weighing so many times more than in the search."""
 MOST_RAISES = 3
@@ -72,7 +74,7 @@ class FleetSearch:
     ) -> None:
         self._mission, self._routes, self._budget, self._on_progress = mission, routes, budget, on_progress
         self._care, self._raises, self._detours = Care(), 0, 0
-        self._paths_m: list[Array | None] = [None] * len(routes)
+        self._ways: list[Way | None] = [None] * len(routes)
         self._guides = guides(mission, routes)
         self._settings = EcpsoSettings()
         self._problem = pose(mission, routes, self._guides, self._care)
@@ -147,18 +149,17 @@ class FleetSearch:
         """
         stuck = self._swarms.violations_alone(self._swarms.offsets) > LOOKS_FEASIBLE
         for index in np.flatnonzero(stuck):
-            route, wider = self._routes[index], WIDER**self._detours
-            path_m = guide_path(self._mission, route.start_m, route.target_m, wider)
-            if path_m is not None:
-                self._paths_m[index] = path_m
+            way = guide_way(self._mission, self._routes[index], WIDER**self._detours)
+            if way is not None:
+                self._ways[index] = way
             elif self._detours == 0:  # as far as can be told, there is none: no use in being stubborn
                 self._budget = self._budget.settled(self.evaluations)
-        corners = max((len(path_m) for path_m in self._paths_m if path_m is not None), default=0)
-        if not stuck.any() or corners == 0:
+        if not stuck.any() or not any(self._ways):
             return
-        n_control = control_points(self._mission, corners * (1 + self._detours))
+        ways = [way or route.straight for way, route in zip(self._ways, self._routes, strict=True)]
+        n_control = control_points(self._mission, ways, POINTS_PER_CORNER * (1 + self._detours))
         self._detours += 1
-        self._guides = guides(self._mission, self._routes, self._paths_m, n_control)
+        self._guides = guides_along(self._mission, ways, n_control)
         self._problem = pose(self._mission, self._routes, self._guides, self._care)
         self._swarms = self._swarms.again(self._problem)
         self._present = None

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import numpy.typing as npt
 
-from gcs.planner.curves import distances_to_segment, path_lengths
+from gcs.planner.curves import distances_to_segment, passing_samples, path_lengths
 from gcs.planner.timing import Timing
 from missions.mission import Mission, Site
 from missions.mission_items import Track
@@ -24,21 +24,25 @@ SPEED_STEP_M_S = {Site.INDOOR: 0.1, Site.OUTDOOR: 0.01}
 """Leg speeds are multiples of this. Long legs need the finer one, or the vehicles would not arrive together."""
 
 
-def sample_track(mission: Mission, curve_m: Array, timing: Timing) -> Track:
+def sample_track(mission: Mission, curve_m: Array, timing: Timing, stops_m: Array) -> Track:
     """The track of one vehicle: its launch point is left out, its last point is the target.
 
-    Legs begin and end where the fleet starts or ends to fly at avoidance speed, so that no leg is faster than its
-    slowest part may be. Between these as few points are kept as hold the polygon to its tolerance, which grows until
-    there are no more than `MOST_POINTS`.
+    The (k, 3) targets on the way are points of it. Legs begin and end where the fleet starts or ends to fly at
+    avoidance speed, so that no leg is faster than its slowest part may be. Between these as few points are kept as hold
+    the polygon to its tolerance, which grows until there are no more than `MOST_POINTS`.
     """
-    fixed = [0, *(np.flatnonzero(np.diff(timing.held_back)) + 1).tolist(), len(curve_m) - 1]
+    passed = passing_samples(curve_m, stops_m)
+    slowed = (np.flatnonzero(np.diff(timing.held_back)) + 1).tolist()
+    fixed = np.unique([0, *slowed, *passed, len(curve_m) - 1])
     looked_at = np.union1d(fixed, np.linspace(0, len(curve_m) - 1, min(LOOKED_AT, len(curve_m))).astype(int))
     tolerance_m = max(TOLERANCE_SHARE * mission.limits.clearance_m, LEAST_TOLERANCE_M)
     kept = looked_at[_thinned(curve_m[looked_at], np.searchsorted(looked_at, fixed), tolerance_m)]
     while len(kept) > max(MOST_POINTS + 1, len(fixed)):
         tolerance_m *= COARSER
         kept = looked_at[_thinned(curve_m[looked_at], np.searchsorted(looked_at, fixed), tolerance_m)]
-    return Track(curve_m[kept[1:]], _leg_speeds(mission, curve_m, timing, kept))
+    points_m = curve_m[kept[1:]]
+    points_m[np.searchsorted(kept[1:], passed)] = stops_m
+    return Track(points_m, _leg_speeds(mission, curve_m, timing, kept))
 
 
 def _thinned(curve_m: Array, fixed: IntArray, tolerance_m: float) -> list[int]:

@@ -122,7 +122,8 @@ class Page:
             return
         by_sysid = vehicle_colours(vehicle_order(self._desk))
         if self._plan.show(flight.plan, by_sysid):
-            self._world.colour_targets({part.target.name: by_sysid[part.sysid] for part in flight.plan.vehicles})
+            parts = flight.plan.vehicles
+            self._world.colour_targets({t.name: by_sysid[part.sysid] for part in parts for t in part.targets})
 
     def _ground_height_m(self, places_m: Array) -> Array:
         return self._world.ground_height_m(places_m) if self._world is not None else np.zeros(len(places_m))

@@ -11,6 +11,7 @@ from missions import obstacles
 from missions.faults import CompanionKill
 from missions.mission import LinkSettings, OnArrival, load_mission
 from tests.simulation.whole_system import WholeSystem
+from tests.unit.gcs.planner.worlds import round_trip
 
 INDOOR = load_mission("indoor")
 
@@ -109,6 +110,37 @@ def test_where_the_mission_says_hold_vehicles_end_holding_at_their_targets():
         state = system.station.vehicle(vehicle.sysid)
         assert (state.mode, state.landed, vehicle.landed) == (Mode.HOLD, LandedState.IN_AIR, False)
         assert vehicle.target_error_m < 0.5
+
+
+def passes_in_order(system: WholeSystem) -> dict[str, list[str]]:
+    """For each vehicle the targets that it really came near to, in time."""
+    passed: dict[str, list[str]] = {}
+    for vehicle in system.mission.vehicles:
+        flown = system.flown()[vehicle.sysid].in_flight()
+        near = {}
+        for target in system.mission.targets:
+            off_m = np.linalg.norm(flown.positions_m - np.array(target.position_m), axis=1)
+            if off_m.min() <= system.mission.site.arrival_tolerance_m:
+                near[target.name] = int(np.argmin(off_m))
+        passed[vehicle.name] = sorted(near, key=near.__getitem__)
+    return passed
+
+
+@pytest.mark.parametrize("mode", [PlanningMode.END_CLOUD, PlanningMode.CLOUD, PlanningMode.ONBOARD])
+def test_a_route_of_several_targets_is_flown_as_one_mission(mode: PlanningMode):
+    system = WholeSystem(round_trip(), mode, seed=1)
+    report = system.fly()
+    assert report.success, report.reason
+    assert passes_in_order(system) == {"alpha": ["south", "south-east"], "bravo": ["north", "north-east"]}
+
+
+def test_a_vehicle_that_gets_no_target_is_left_on_its_pad():
+    alone = msgspec.structs.replace(INDOOR, allocation={"alpha": "north-east", "bravo": ()})
+    system = WholeSystem(alone)
+    report = system.fly()
+    assert report.success, report.reason
+    assert [vehicle.name for vehicle in report.vehicles] == ["alpha"]
+    assert np.ptp(system.flown()[2].positions_m, axis=0).max() < 0.1
 
 
 def test_a_companion_with_another_mission_file_is_not_started():

@@ -15,15 +15,17 @@ Array = np.ndarray
 def fleet_cost(problem: Problem, offsets: Array) -> tuple[float, float]:
     """Objective and violation of a whole plan."""
     controls_m = all_control_points(problem, offsets)
+    n_samples = len(problem.samples.first)
     costs = [
-        curve_cost(control_m, len(problem.samples.first), problem.terms, problem.obstacles) for control_m in controls_m
+        curve_cost(control_m, n_samples, problem.terms, problem.obstacles, zones_m)
+        for control_m, zones_m in zip(controls_m, problem.zones_m, strict=True)
     ]
     places_m = [places(control_m, len(problem.samples.first), len(problem.coupling.first)) for control_m in controls_m]
     objective, violation = np.sum(costs, axis=0)
     return objective, violation + between(problem.coupling, places_m)
 
 
-def curve_cost(control_m: Array, n_samples: int, terms: Terms, solid: Obstacles) -> tuple[float, float]:
+def curve_cost(control_m: Array, n_samples: int, terms: Terms, solid: Obstacles, zones_m: Array) -> tuple[float, float]:
     """Objective and violation of one curve."""
     spline = BSpline(bspline.clamped_knots(len(control_m)), control_m, 3)
     u = np.linspace(0.0, 1.0, n_samples)
@@ -40,8 +42,8 @@ def curve_cost(control_m: Array, n_samples: int, terms: Terms, solid: Obstacles)
     )
     earned = np.sum(sides * 0.5 * (reward[1:] + reward[:-1])) / sides.sum()
 
-    ends = np.minimum(np.linalg.norm(points - points[0], axis=1), np.linalg.norm(points - points[-1], axis=1))
-    in_zone = ends < terms.zone_radius_m
+    to_zones = np.linalg.norm(points[:, None] - zones_m, axis=2)
+    in_zone = to_zones.min(axis=1) < terms.zone_radius_m
     required_m, high_m = np.where(in_zone, terms.contact_m, terms.clearance_m), np.where(in_zone, 0.0, terms.height_m)
     speed = np.linalg.norm(slope, axis=1)
     curvature = np.linalg.norm(np.cross(slope, bend), axis=1) / speed**3

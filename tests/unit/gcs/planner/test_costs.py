@@ -3,6 +3,7 @@
 import msgspec
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from gcs.planner.allocation import allocate
 from gcs.planner.fleet_cost import (
@@ -16,10 +17,10 @@ from gcs.planner.fleet_cost import (
 )
 from gcs.planner.obstacle_gradient import clearances, heights
 from gcs.planner.problem import guides, pose
-from missions import obstacles
+from missions import bspline, obstacles
 from missions.mission import Mission, load_mission
 from tests.unit.gcs.planner import reference
-from tests.unit.gcs.planner.worlds import everything, room, wall
+from tests.unit.gcs.planner.worlds import everything, room, round_trip, wall
 
 UNCAPPED = msgspec.structs.replace(load_mission("terrain-1-5uav").planner, clearance_cap_m=None, height_cap_m=None)
 
@@ -31,6 +32,10 @@ MISSIONS = {
     "time slack and a tight gap": room(wall(10.0, (6.5, 8.0))),
     "wide turns and gentle climbs": everything(limits=NARROW),
     "one vehicle": load_mission("field"),
+    "targets on the way": round_trip(),
+    "routes of unequal length": msgspec.structs.replace(
+        everything(), allocation={"alpha": ("target-3", "target-1"), "bravo": ("target-2",), "charlie": ()}
+    ),
 }
 
 
@@ -93,6 +98,16 @@ def test_the_cost_of_a_fleet_equals_its_numpy_reference(problem: Problem, seed: 
     offsets = some_offsets(problem, seed)
     expected = reference.fleet_cost(problem, offsets)
     np.testing.assert_allclose(fleet_cost(problem, offsets, np.empty_like(offsets)), expected, rtol=1e-6)
+
+
+def test_whatever_the_offsets_curves_pass_their_targets_on_the_way_at_a_knot():
+    mission = round_trip()
+    problem = posed(mission)
+    controls_m = all_control_points(problem, some_offsets(problem, 4, 0.3))
+    for control_m, route in zip(controls_m, allocate(mission), strict=True):
+        spline = BSpline(bspline.clamped_knots(len(control_m)), control_m, 3)
+        off_m = np.linalg.norm(spline(np.unique(spline.t)) - route.places_m[1], axis=1)
+        assert off_m.min() < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -1,5 +1,6 @@
 """The judge finds every breach, names it, and finds none where there is none."""
 
+import dataclasses
 from collections.abc import Callable
 
 import msgspec
@@ -8,7 +9,7 @@ import pytest
 
 from gcs.planner import feasibility
 from gcs.planner.plan import Limit, TimedCurve, Violation
-from missions.mission import Mission, load_mission
+from missions.mission import Mission, Target, load_mission
 from missions.world import Peak, Threat
 from tests.unit.gcs.planner.worlds import room, wall
 
@@ -21,7 +22,7 @@ def flown(mission: Mission, lines: list[Callable[[np.ndarray], np.ndarray]], cou
     curves_m = [line(share) for line in lines]
     length_m = max(float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) for curve in curves_m)
     return [
-        TimedCurve(vehicle.name, vehicle.sysid, target, curve, share[:, 0] * length_m / SPEED_M_S)
+        TimedCurve(vehicle.name, vehicle.sysid, (target,), curve, share[:, 0] * length_m / SPEED_M_S)
         for vehicle, target, curve in zip(mission.vehicles, mission.targets, curves_m, strict=True)
     ]
 
@@ -130,6 +131,22 @@ def test_ends_that_are_not_start_and_target_are_found():
     curves = flown(mission, [straight((1.1, 6, 1.5), (19, 6, 1.5)), straight((1, 8, 1.5), (19, 8, 1.7))])
     breaches = found(mission, curves)
     assert (breaches[Limit.START].vehicle, breaches[Limit.TARGET].vehicle) == ("v1", "v2")
+
+
+def test_a_target_on_the_way_that_is_missed_or_passed_too_late_is_found():
+    mission, curves = straight_room()
+    by = {name: Target(name=name, position_m=place) for name, place in
+          {"on": (10.0, 6.0, 1.5), "beside": (10.0, 6.3, 1.5), "before": (4.0, 6.0, 1.5)}.items()}  # fmt: skip
+
+    def passing(*names: str) -> dict[Limit, Violation]:
+        targets = (*(by[name] for name in names), *curves[0].targets)
+        return found(mission, [dataclasses.replace(curves[0], targets=targets), curves[1]])
+
+    assert passing("before", "on") == {}
+    breach = passing("beside")[Limit.ROUTE]
+    assert (breach.vehicle, breach.found) == ("v1", pytest.approx(0.3, abs=0.01))
+    assert breach.where.startswith("(beside) at (10.0, 6.0, 1.5) m")
+    assert passing("on", "before")[Limit.ROUTE].found == pytest.approx(6.0, abs=0.1)
 
 
 def crossing() -> tuple[Mission, list[TimedCurve]]:

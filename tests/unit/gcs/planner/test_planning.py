@@ -11,7 +11,7 @@ import pytest
 from gcs.errors import UsageError
 from gcs.planner import FleetPlan, Limit, Progress, feasibility, plan_mission
 from missions.mission import Mission, load_mission, shipped_missions
-from tests.unit.gcs.planner.worlds import forest, room, wall
+from tests.unit.gcs.planner.worlds import forest, room, round_trip, wall
 
 QUICKLY = 250
 MAZE = wall(5.0, (11.0, 13.5)) + wall(10.0, (1.5, 4.0)) + wall(15.0, (11.0, 13.5))
@@ -151,6 +151,7 @@ def test_a_vehicle_whose_target_is_where_it_starts_stays_there():
         (room(endurance_s=1.0), Limit.ENDURANCE, {"v1", "v2"}),
         (room(separation_m=2.5), Limit.SEPARATION, {"v1"}),
         (room(mean_separation_m=(15.0, 20.0)), Limit.LEAST_MEAN_SEPARATION, {"v1", "v2"}),
+        (room(wall(10.0, None), targets_m=((10.55, 6.0, 1.5), (19.0, 8.0, 1.5))), Limit.CLEARANCE, {"v1", "v2"}),
         (
             room(pads_m=((1.0, 6.0, 0.0),), targets_m=((2.0, 6.0, 3.5),), climb_angle_deg=20.0, range_m=3.0),
             Limit.CLIMB_ANGLE,
@@ -164,6 +165,7 @@ def test_a_vehicle_whose_target_is_where_it_starts_stays_there():
         "no endurance",
         "starts too close",
         "room too small",
+        "target too close to a wall",
         "too steep",
     ],
 )
@@ -174,6 +176,44 @@ def test_what_cannot_be_planned_is_not_called_feasible_and_the_reason_is_given(
     assert not plan.feasible
     assert {violation.vehicle for violation in plan.violations if violation.limit is limit} == vehicles
     assert all(str(violation) for violation in plan.violations)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_targets_on_the_way_are_flown_through_in_their_order(seed: int):
+    mission = round_trip()
+    plan = plan_mission(mission, seed=seed, evaluations=QUICKLY)
+    assert plan.violations == ()
+    assert [target.name for target in plan.vehicles[0].targets] == ["south", "south-east"]
+    for vehicle in plan.vehicles:
+        stop_m, end_m = (np.array(target.position_m) for target in vehicle.targets)
+        assert np.linalg.norm(vehicle.curve_m - stop_m, axis=1).min() < 0.025
+        assert np.flatnonzero(np.all(vehicle.track.points_m == stop_m, axis=1)).size == 1
+        np.testing.assert_allclose(vehicle.track.points_m[-1], end_m)
+        np.testing.assert_allclose(vehicle.targets_alone.points_m, [stop_m, end_m])
+
+
+def test_a_route_through_a_maze_follows_guide_paths_from_target_to_target():
+    mission = room(MAZE, pads_m=((1.0, 6.0, 0.0),), targets_m=((7.5, 2.0, 1.5), (19.0, 8.0, 1.5)))
+    plan = plan_mission(msgspec.structs.replace(mission, allocation={"v1": ("t1", "t2")}))
+    assert plan.violations == ()
+    assert 35.0 < plan.vehicles[0].length_m < 45.0
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_fewer_vehicles_than_targets_share_them(count: int):
+    terrain = load_mission("terrain-1-5uav")
+    plan = plan_mission(msgspec.structs.replace(terrain, vehicles=terrain.vehicles[:count]))
+    assert plan.violations == ()
+    visited = [target.name for vehicle in plan.vehicles for target in vehicle.targets]
+    assert sorted(visited) == sorted(target.name for target in terrain.targets)
+    assert max(vehicle.length_m for vehicle in plan.vehicles) < 3200.0
+
+
+def test_vehicles_without_a_target_stay_and_are_named():
+    mission = load_mission("indoor")
+    plan = plan_mission(msgspec.structs.replace(mission, targets=mission.targets[:1], allocation=None))
+    assert plan.violations == ()
+    assert ([vehicle.name for vehicle in plan.vehicles], plan.staying) == (["bravo"], ("alpha",))
 
 
 def test_an_unmapped_obstacle_does_not_change_the_plan():
@@ -188,12 +228,12 @@ def test_the_written_plan_has_everything_that_was_promised():
     document = json.loads(plan.to_json())
     assert list(document) == [
         "mission", "algorithm", "seed", "evaluations", "wall_s", "cpu_s",
-        "objective", "feasible", "violations", "convergence", "vehicles",
+        "objective", "feasible", "violations", "convergence", "vehicles", "staying",
     ]  # fmt: skip
     assert (document["mission"], document["algorithm"], document["seed"]) == ("indoor", "ecpso", 4)
     assert document["convergence"] == [progress.objective for progress in plan.convergence]
     first = document["vehicles"][0]
-    assert list(first) == ["name", "target", "track_points_enu_m", "curve_enu_m", "length_m"]
+    assert list(first) == ["name", "target", "targets", "track_points_enu_m", "curve_enu_m", "length_m"]
     np.testing.assert_allclose(first["curve_enu_m"], plan.vehicles[0].curve_m, atol=1e-6)
     assert first["curve_enu_m"][0] == [1.0, 6.5, 1.5]
     assert first["curve_enu_m"][-1] == first["track_points_enu_m"][-1] == [19.0, 8.5, 1.5]

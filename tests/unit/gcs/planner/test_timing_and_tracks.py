@@ -12,6 +12,8 @@ from missions import obstacles, time_law
 from missions.mission import Mission, load_mission
 from tests.unit.gcs.planner.worlds import room, wall
 
+NO_STOPS = np.empty((0, 3))
+
 
 def lines(*ends: tuple[tuple[float, ...], tuple[float, ...]], count: int = 600) -> np.ndarray:
     """(vehicles, m, 3) straight curves."""
@@ -89,13 +91,13 @@ def test_between_two_obstacles_it_does_not_speed_up_for_a_moment():
 
 def test_a_straight_flight_is_one_leg_to_the_target():
     mission = room(pads_m=((1.0, 6.0, 0.0),), targets_m=((19.0, 6.0, 1.5),))
-    track = sample_track(mission, THROUGH_THE_GAP[0], timed(mission, THROUGH_THE_GAP))
+    track = sample_track(mission, THROUGH_THE_GAP[0], timed(mission, THROUGH_THE_GAP), NO_STOPS)
     np.testing.assert_allclose(track.points_m, [[19.0, 6.0, 1.5]])
     assert track.speeds_m_s.tolist() == [3.0]
 
 
 def test_no_leg_is_faster_than_obstacles_allow_and_speed_changes_are_few():
-    track = sample_track(GAP, THROUGH_THE_GAP[0], timed(GAP, THROUGH_THE_GAP))
+    track = sample_track(GAP, THROUGH_THE_GAP[0], timed(GAP, THROUGH_THE_GAP), NO_STOPS)
     assert track.speeds_m_s.tolist() == [3.0, 1.0, 3.0]
     begins_m = np.concatenate(([[1, 6, 1.5]], track.points_m[:-1]))
     solid = obstacles.pack(GAP.world)
@@ -113,7 +115,7 @@ def wavy(swing_m: float) -> np.ndarray:
 def test_legs_stay_near_the_curve_unless_that_takes_too_many(swing_m: float):
     mission = room(pads_m=((1.0, 7.0, 0.0),), targets_m=((19.0, 7.0, 1.5),), turn_radius_m=0.0)
     curves_m = wavy(swing_m)
-    track = sample_track(mission, curves_m[0], timed(mission, curves_m))
+    track = sample_track(mission, curves_m[0], timed(mission, curves_m), NO_STOPS)
     corners_m = np.concatenate((curves_m[0, :1], track.points_m))
     off_m = np.min([distances_to_segment(curves_m[0], a, b) for a, b in itertools.pairwise(corners_m)], axis=0).max()
     assert len(track.points_m) <= MOST_POINTS
@@ -125,7 +127,7 @@ def test_outdoors_leg_speeds_are_fine_enough_to_arrive_together():
     mission = load_mission("terrain-1-5uav")
     curves_m = lines(((0, 0, 0), (2000, 1200, 900)), ((0, 0, 0), (2000, 680, 280)), count=2500)
     timing = timed(mission, curves_m)
-    tracks = [sample_track(mission, curve_m, timing) for curve_m in curves_m]
+    tracks = [sample_track(mission, curve_m, timing, NO_STOPS) for curve_m in curves_m]
     lengths_m = path_lengths(curves_m)
     arrivals_s = [length_m / track.speeds_m_s[0] for length_m, track in zip(lengths_m, tracks, strict=True)]
     assert abs(arrivals_s[0] - arrivals_s[1]) < 2.0
@@ -138,3 +140,13 @@ def test_times_follow_from_the_law_of_the_missions_package():
     limit_m_s = timing.allowed_1_s * 18.0
     expected = time_law.times_along(THROUGH_THE_GAP[0], time_law.speeds_along(THROUGH_THE_GAP[0], limit_m_s, 2.0))
     np.testing.assert_allclose(timing.times_s, expected, atol=1e-6)
+
+
+def test_targets_on_the_way_are_points_of_the_track_in_their_order():
+    mission = room(pads_m=((1.0, 7.0, 0.0),), targets_m=((19.0, 7.0, 1.5),), turn_radius_m=0.0)
+    curves_m = wavy(0.3)
+    stops_m = curves_m[0, [300, 500]] + 0.01
+    track = sample_track(mission, curves_m[0], timed(mission, curves_m), stops_m)
+    first, second = (np.flatnonzero(np.all(track.points_m == stop_m, axis=1)) for stop_m in stops_m)
+    assert len(first) == len(second) == 1
+    assert first[0] < second[0] < len(track.points_m) - 1

@@ -43,6 +43,19 @@ def room(
     return mission
 
 
+def round_trip() -> Mission:
+    """The indoor mission with a target for each vehicle on the way, far off the straight line."""
+    indoor = load_mission("indoor")
+    on_the_way = (
+        Target(name="north", position_m=(10.0, 12.0, 1.5)),
+        Target(name="south", position_m=(9.0, 3.0, 1.2)),
+    )
+    routes = {"alpha": ("south", "south-east"), "bravo": ("north", "north-east")}
+    mission = msgspec.structs.replace(indoor, name="round-trip", targets=indoor.targets + on_the_way, allocation=routes)
+    assert not list(contradictions(mission))
+    return mission
+
+
 def forest(count: int, seed: int) -> Mission:
     """Four vehicles across 30 m of random trunks from floor to ceiling, to permuted targets."""
     rng, centres = np.random.default_rng(seed), np.empty((0, 2))
