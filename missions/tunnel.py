@@ -81,7 +81,7 @@ class TrajectoryMessage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CompanionStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """A companion's report, sent at 2 Hz and at every change of state."""
+    """A companion's report, sent at 5 Hz of vehicle time and at every change of state."""
 
     state: CompanionState
     reason: Reason = Reason.NONE

@@ -1,1 +1,4 @@
-"""What lies between the vehicles and the outside: sockets, the faults of the ground link, the truth log."""
+"""What lies between the vehicles and the outside.
+
+`udp` (sockets and pace) and `truth_log` stand above the simulator; `ground_link`, faults on simulated time, below it.
+"""
