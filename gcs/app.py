@@ -138,7 +138,8 @@ class FlightApp:
             self.events.add("failed", str(problem), severity=Severity.ERROR)
             await asyncio.Event().wait()
         except BaseException as ended:  # Ctrl-C, a simulator that died, or a defect: nothing is left to itself
-            await self._leave_holding(f"interrupted ({type(ended).__name__})")
+            cancelled = isinstance(ended, asyncio.CancelledError)
+            await self._leave_holding("interrupted" if cancelled else f"interrupted ({type(ended).__name__})")
             raise
         finally:
             await self.desk.close()
@@ -162,11 +163,13 @@ class FlightApp:
 
     async def _start_simulator(self, processes: Processes) -> Child:
         settings = self.settings
+        self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in half a minute")
         options = ["--seed", str(settings.seed), "--truth", str(self.work_dir / TRUTH_FILE)]
         return await processes.start("sitl", "sitl", settings.mission, *options, *self._common_options())
 
     async def _start_companions(self, processes: Processes) -> list[Child]:
         children: list[Child] = []
+        self.events.add("process", f"starting {len(self.flight.mission.vehicles)} companions")
         for vehicle in self.flight.mission.vehicles:
             name = f"companion-{vehicle.sysid}"
             options = ["--vehicle", str(vehicle.sysid), "--mission", self.settings.mission]
