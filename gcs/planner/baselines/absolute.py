@@ -44,13 +44,22 @@ class Joint:
         inner = self._middle_m + self._half_m * positions.reshape(-1, n_vehicles, n_control - 2, 3)
         starts = np.broadcast_to(self.start_m[:, None], (*inner.shape[:2], 1, 3))
         targets = np.broadcast_to(self.target_m[:, None], (*inner.shape[:2], 1, 3))
-        return np.concatenate((starts, inner, targets), axis=2)
+        return self._pinned(np.concatenate((starts, inner, targets), axis=2))
 
     def costs(self, positions: Array) -> tuple[Array, Array]:
         """(plans,) eq. 13 and (plans,) sums of squared violations."""
         objective, violation = np.empty(len(positions)), np.empty(len(positions))
         plan_costs(self._problem, self.controls(positions), objective, violation)
         return objective, violation
+
+    def _pinned(self, controls_m: Array) -> Array:
+        """The same, with those control points moved that make curves pass the targets on their ways."""
+        problem, weights = self._problem, self._problem.pin_weights
+        for vehicle, stop in zip(*np.nonzero(problem.pins), strict=True):
+            c, own = problem.pins[vehicle, stop], controls_m[:, vehicle]
+            beside = weights[c, 0] * own[:, c - 1] + weights[c, 2] * own[:, c + 1]
+            own[:, c] = (problem.zones_m[vehicle, 1 + stop] - beside) / weights[c, 1]
+        return controls_m
 
     def _lattice(self) -> Lattice:
         """For each vehicle and control point a plane across the axis, east or north, along which it goes farther."""

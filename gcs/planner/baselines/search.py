@@ -13,7 +13,7 @@ from gcs.planner.plan import Progress
 from gcs.planner.problem import Route, guides, pose
 from missions.mission import Mission
 
-STRICTNESS = 30.0
+STRICTNESS = 100.0
 """Violations weigh so many times more than in the shipped search, whose polish mends what lighter penalties leave."""
 LOOKS_FEASIBLE = 1e-4
 """A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge ..."""
