@@ -11,7 +11,3 @@ class UsageError(CompanionError):
 
 class CommandRefused(CompanionError):
     """The autopilot refused what it was asked for, or did not answer."""
-
-
-class AutopilotUnsuitable(CompanionError):
-    """The autopilot speaks, but not so that it can be flown: another frame, another system id."""

@@ -18,8 +18,6 @@ GCS_SYSTEM, GCS_COMPONENT = 255, mavlink.MAV_COMP_ID_MISSIONPLANNER
 AUTOPILOT, COMPANION = mavlink.MAV_COMP_ID_AUTOPILOT1, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
 """Component ids 1 and 191 of every vehicle."""
 
-MAIN_AUTO = 4
-
 
 class Mode(IntEnum):
     """PX4's flight modes as HEARTBEAT.custom_mode carries them: sub mode << 24 | main mode << 16."""

@@ -23,9 +23,5 @@ class ConfigError(MissionError):
         self.path, self.line, self.key, self.problem = path, line, key, problem
 
 
-class InfeasibleMission(MissionError):
-    """A mission that is well written and cannot be planned for."""
-
-
 class WireFormatError(MissionError):
     """Bytes or mission items from outside that do not mean what they claim to mean."""

@@ -109,24 +109,6 @@ def swap_enu_ned(vectors_m: Array) -> Array:
     return np.stack((v[..., 1], v[..., 0], -v[..., 2]), axis=-1)
 
 
-def heading_rad(velocity_enu_m_s: Array) -> Array:
-    """Compass heading (0 north, pi/2 east), in (-pi, pi], of (..., 2 or 3) ENU vectors."""
-    return np.arctan2(velocity_enu_m_s[..., 0], velocity_enu_m_s[..., 1])
-
-
-def rotation_enu_from_flu(quaternion_ned_frd: Array) -> Array:
-    """(3, 3) rotation from the body's FLU axes to ENU, of a MAVLink attitude quaternion (w, x, y, z; FRD -> NED)."""
-    w, x, y, z = np.asarray(quaternion_ned_frd, dtype=float) / np.linalg.norm(quaternion_ned_frd)
-    ned_from_frd = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    return swap_enu_ned((ned_from_frd * np.array([1.0, -1.0, -1.0])).T).T
-
-
 def quaternion_enu_from_flu(quaternion_ned_frd: Array) -> Array:
     """(..., 4) unit quaternions (w, x, y, z; FLU -> ENU) of MAVLink attitudes (w, x, y, z; FRD -> NED)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion_ned_frd, dtype=float), -1, 0)

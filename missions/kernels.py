@@ -40,11 +40,6 @@ def compiled(function: F) -> F:
     return cast(F, njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
-def inlined(function: F) -> F:
-    """As `compiled`, for the small helpers that other compiled functions call in their inner loops."""
-    return cast(F, njit(cache=True, inline="always", error_model="numpy")(function))
-
-
 def sources_of(module: Path) -> set[Path]:
     """The files whose change may change what `module` compiles to: itself, and all of ours that it imports."""
     found: set[Path] = set()

@@ -31,10 +31,6 @@ def start_mission() -> Command:
     return Command("start the mission", mavlink.MAV_CMD_MISSION_START)
 
 
-def request_message(message_id: int) -> Command:
-    return Command("request a message", mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id),))
-
-
 def set_message_interval(message_id: int, rate_hz: float) -> Command:
     params = (float(message_id), 1e6 / rate_hz)
     return Command("set a message interval", mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, params)

@@ -66,8 +66,6 @@ class Commander:
         self._terminated_s: float | None = None
         self.intended = Mode.HOLD
         self.armed = False
-        self.armed_s = 0.0
-        """When it was armed last."""
 
     # ------------------------------------------------------------------ state
     @property
@@ -114,7 +112,7 @@ class Commander:
         if self._terminated_s is not None or (not forced and (not self.ready or lost_gcs)):
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
             return Result.TEMPORARILY_REJECTED
-        self.armed, self.armed_s = True, self._now_s
+        self.armed = True
         self._flown_since_arming, self._landed_since_s = False, None
         self._failsafes.clear()
         self._say(Severity.INFO, f"Armed by {reason}")

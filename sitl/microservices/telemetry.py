@@ -19,7 +19,6 @@ from sitl.dynamics.state import Guidance
 from sitl.snapshot import Snapshot
 
 NAN = math.nan
-NO_COVARIANCE = (NAN,) * 21
 
 SENSORS_PRESENT, SENSORS_ENABLED = 0x0300402D, 0x0301402D
 SENSORS_HEALTHY = 0x2320C83F

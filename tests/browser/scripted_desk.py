@@ -23,7 +23,7 @@ from gcs.planner.plan import FleetPlan, VehiclePlan
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions import tunnel
-from missions.frames import LocalFrame, heading_rad
+from missions.frames import LocalFrame
 from missions.mission import Mission, load_mission
 from missions.trajectory import Trajectory
 from missions.tunnel import CompanionState, CompanionStatus, TrajectoryKind, TrajectoryMessage
@@ -114,7 +114,7 @@ class ScriptedVehicle:
     def _attitude(self) -> Any:
         """Nose along the way, leaning forward with speed."""
         speed_m_s = float(np.linalg.norm(self.velocity_m_s[:2]))
-        yaw = float(heading_rad(self.velocity_m_s)) if speed_m_s > 0.1 else np.pi / 2
+        yaw = float(np.arctan2(*self.velocity_m_s[:2])) if speed_m_s > 0.1 else np.pi / 2
         return mavlink.MAVLink_attitude_message(round(self.clock_s * 1e3), 0.0, -0.08 * min(speed_m_s, 4), yaw, 0, 0, 0)
 
     def _landed(self) -> Any:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common
 
-from gcs.link.tlog import read_tlog
 from tests.integration import programs
+from tests.recordings import read_tlog
 
 pytestmark = pytest.mark.processes
 

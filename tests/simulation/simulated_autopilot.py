@@ -136,7 +136,7 @@ class SimulatedAutopilot:
         await self._found.wait()
         for message_id, rate_hz in RATES_HZ.items():
             await self._command(actions.set_message_interval(message_id, rate_hz))
-        await self._command(actions.request_message(GPS_GLOBAL_ORIGIN))
+        await self._command(Command("request the origin", mavlink.MAV_CMD_REQUEST_MESSAGE, (float(GPS_GLOBAL_ORIGIN),)))
 
     async def _command(self, command: Command) -> None:
         try:

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from gcs.dialect import mavlink
 from gcs.errors import UsageError
 from gcs.link.codec import Codec
-from gcs.link.tlog import TlogWriter, read_tlog
+from gcs.link.tlog import TlogWriter
 from gcs.link.url import LinkUrl, Scheme, parse_link_url
+from tests.recordings import read_tlog
 from tests.unit.gcs.messages import frame_of
 
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3)
