@@ -6,10 +6,8 @@ control; whatever ends a flight early leaves the vehicle in a mode that was chos
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from companion import events, instructions
@@ -23,6 +21,7 @@ from companion.planner.planner import Plan, Planner
 from companion.settings import CompanionSettings
 from companion.states import NOT_READY, TRANSITIONS, UNDER_WAY, State
 from companion.status import StatusDesk
+from companion.utc_clock import UtcClock
 from missions.mission import Mission, OnArrival
 from missions.tunnel import Reason
 
@@ -53,7 +52,7 @@ class Pilot:
         self._odometry: events.Odometry | None = None
         self._mode = FlightMode.OTHER
         self._armed, self._on_ground = False, True
-        self._utc_ahead_s: float | None = None
+        self._utc = UtcClock()
         self._engagement: Engagement | None = None
         self._flight: Flight | None = None
         self._leaving: FlightMode | None = None
@@ -118,8 +117,7 @@ class Pilot:
         if self._odometry is not None and odometry.time_s < self._odometry.time_s - REBOOT_S:
             yield from self._on_lost(events.AutopilotLost(), now_s)
             yield from self._on_found(events.AutopilotFound(), now_s)
-        first = self._odometry is None
-        self._odometry = odometry
+        first, self._odometry = self._odometry is None, odometry
         if self._flight is not None:
             self._flight.observe(odometry)
         if first:
@@ -150,7 +148,7 @@ class Pilot:
         yield from self._on_the_ground()
 
     def _on_utc(self, event: events.UtcReported, now_s: float) -> Iterator[Instruction]:
-        self._utc_ahead_s = event.ahead_s
+        self._utc.ahead_s = event.ahead_s
         yield from ()
 
     def _on_mode(self, event: events.ModeReported, now_s: float) -> Iterator[Instruction]:
@@ -235,13 +233,17 @@ class Pilot:
         grounded = self.state is State.RELEASED and self._on_ground and not self._armed
         if not (self.state in {State.CONNECTING, State.WAITING, State.READY} or (over and (fresh or grounded))):
             return
-        missing = self._briefing.missing if self._odometry is not None else Reason.NO_POSITION
         if not self._connected:
             return
-        if missing is not Reason.NONE:
-            self._enter(State.WAITING, missing)
+        if self._missing is not Reason.NONE:
+            self._enter(State.WAITING, self._missing)
         elif self.state is not State.READY:
             self._enter(State.READY, Reason.NONE)
+
+    @property
+    def _missing(self) -> Reason:
+        """What keeps this vehicle from being flown; NONE when nothing does."""
+        return self._briefing.missing if self._odometry is not None else Reason.NO_POSITION
 
     # ------------------------------------------------------------ start and stop
 
@@ -264,7 +266,7 @@ class Pilot:
         if self.state in UNDER_WAY or self.in_control:
             return CommandResult.ACCEPTED, Reason.NONE  # a repeated copy
         if self.state in NOT_READY or self._briefing.order is None or self._odometry is None:
-            missing = self._briefing.missing if self._connected else Reason.AUTOPILOT_LOST
+            missing = self._missing if self._connected else Reason.AUTOPILOT_LOST
             final = missing in {Reason.NO_MISSION, Reason.MISSION_NOT_UNDERSTOOD}
             return (CommandResult.DENIED if final else CommandResult.TEMPORARILY_REJECTED), missing
         if self._on_ground or not self._armed:
@@ -279,7 +281,7 @@ class Pilot:
         self._stopping = True
         yield instructions.Note("stop requested", {"state": self.state.name})
         if self._flight is not None:
-            yield from self._with_utc(self._flight.brake(Reason.STOPPED_BY_OPERATOR, now_s))
+            yield from self._utc.stamped(self._flight.brake(Reason.STOPPED_BY_OPERATOR, now_s))
             self._enter(State.HOLDING, Reason.STOPPED_BY_OPERATOR)
         elif self._engagement is not None and self._engagement.plan is not None:
             yield from self._leave(FlightMode.HOLD, now_s)
@@ -306,12 +308,9 @@ class Pilot:
 
     def _left(self, mode: FlightMode) -> Iterator[Instruction]:
         """The autopilot is in the mode that ends the flight."""
-        stopped = self._stopping
         yield from self._end_control()
-        if stopped:
-            self._enter(State.HOLDING, Reason.STOPPED_BY_OPERATOR)
-        elif mode is FlightMode.HOLD:
-            self._enter(State.HOLDING, Reason.TARGET_REACHED)
+        if mode is FlightMode.HOLD:
+            self._enter(State.HOLDING, Reason.STOPPED_BY_OPERATOR if self._stopping else Reason.TARGET_REACHED)
         else:
             self._enter(State.LANDING, Reason.TARGET_REACHED)
 
@@ -341,7 +340,7 @@ class Pilot:
         self._flight = Flight(self._crew, engagement.order, plan, self._odometry, now_s)
         self._enter(State.FLYING, Reason.NONE)
         yield instructions.Note("flying", {"guide_m": round(plan.guide.length_m, 2)})
-        yield from self._with_utc(self._flight.begin())
+        yield from self._utc.stamped(self._flight.begin())
 
     def _retreat(self, reason: Reason) -> Iterator[Instruction]:
         """Control could not be taken: everything is as it was before the start."""
@@ -362,7 +361,7 @@ class Pilot:
 
     def _on_plan(self, event: events.PlanReady, now_s: float) -> Iterator[Instruction]:
         if self._flight is not None:
-            yield from self._with_utc(self._flight.take(event.plan, event.cpu_ms, now_s))
+            yield from self._utc.stamped(self._flight.take(event.plan, event.cpu_ms, now_s))
         elif self._engagement is not None and self._odometry is not None:
             self.figures.replan_ms.add(event.cpu_ms)
             yield from self._engagement.take(event.plan, self._odometry, now_s)
@@ -376,7 +375,7 @@ class Pilot:
             yield from self._engage(self._engagement, now_s)
 
     def _fly(self, flight: Flight, event: events.Tick, now_s: float) -> Iterator[Instruction]:
-        yield from self._with_utc(flight.tick(now_s, event.odometry_age_s))
+        yield from self._utc.stamped(flight.tick(now_s, event.odometry_age_s))
         self._track_index = flight.track_index
         state = State.FLYING if flight.holding is Reason.NONE else State.HOLDING
         self._enter(state, flight.holding)
@@ -391,16 +390,6 @@ class Pilot:
     def _repeat_command(self, mode: FlightMode, now_s: float) -> Iterator[Instruction]:
         if now_s - self._commanded_at_s > self._settings.command_retry_s:
             yield from self._leave(mode, now_s)
-
-    def _with_utc(self, flown: Iterator[Instruction]) -> Iterator[Instruction]:
-        """Put trajectories that are announced on the clock that vehicles share; before it is known, they are not."""
-        for instruction in flown:
-            if not isinstance(instruction, instructions.SendTrajectory):
-                yield instruction
-            elif self._utc_ahead_s is not None:
-                message, trajectory = instruction.message, instruction.message.trajectory
-                in_utc = replace(trajectory, start_s=trajectory.start_s + self._utc_ahead_s)
-                yield instructions.SendTrajectory(msgspec.structs.replace(message, trajectory=in_utc))
 
     # -------------------------------------------------------------------- status
 

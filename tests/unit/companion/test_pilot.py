@@ -90,11 +90,19 @@ def test_nothing_is_streamed_or_commanded_before_mission_start():
     assert not acts(rig.sent)
 
 
+def without_odometry() -> Rig:
+    rig = Rig()
+    rig.feed(events.AutopilotFound(), events.OriginReported(HOME), events.HomeReported(HOME))
+    rig.load(items_of())
+    return rig
+
+
 @pytest.mark.parametrize(
     ("rig", "answer"),
     [
         (Rig(), (CommandResult.TEMPORARILY_REJECTED, Reason.AUTOPILOT_LOST)),
         (Rig().connect(), (CommandResult.DENIED, Reason.NO_MISSION)),
+        (without_odometry(), (CommandResult.TEMPORARILY_REJECTED, Reason.NO_POSITION)),
         (Rig().ready((MissionItem(command=99),)), (CommandResult.DENIED, Reason.MISSION_NOT_UNDERSTOOD)),
         (Rig().ready(), (CommandResult.TEMPORARILY_REJECTED, Reason.NOT_AIRBORNE)),
     ],
@@ -341,6 +349,13 @@ def test_stopped_while_landing_it_lets_the_autopilot_land():
     rig.feed(events.ModeReported(FlightMode.LAND))
     assert not acts(rig.feed(events.StopRequested()))
     assert rig.pilot.done
+
+
+def test_stopped_while_it_hands_over_for_landing_it_says_that_the_vehicle_lands():
+    rig = Rig().at_target()
+    rig.feed(events.StopRequested(), events.ModeReported(FlightMode.LAND))
+    assert rig.pilot.done
+    assert (rig.pilot.state, rig.pilot.reason) == (State.LANDING, Reason.TARGET_REACHED)
 
 
 def test_control_taken_while_stopping_ends_it_as_well():
