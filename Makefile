@@ -6,8 +6,9 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 
 TEST := $(BIN)/python -m pytest
 SPEED ?= 1
+SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all check format check-px4 clean
+.PHONY: help install demo test test-all bench-planner check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -27,6 +28,10 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(PIP) -e '.[dev]'
 	@touch $@
 
+$(VENV)/.installed-bench: $(VENV)/.installed
+	$(PIP) -e '.[bench]'
+	@touch $@
+
 demo: install  ## fly the paper's indoor mission on the bundled simulator and show it in the browser
 	$(BIN)/gcs fly indoor --sim
 
@@ -43,6 +48,9 @@ test-all: $(VENV)/.installed-dev  ## every test, the slow ones too
 check-px4: install  ## fly the whole sequence on an autopilot that is there: make check-px4 LINK=udpin://0.0.0.0:14550
 	@test -n "$(LINK)" || { echo "usage: make check-px4 LINK=udpin://0.0.0.0:14550 [SPEED=1]"; exit 2; }
 	$(BIN)/gcs fly field --companions --headless --origin here --link $(LINK) --speed $(SPEED) --report out/check-px4
+
+bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
+	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)
 
 check: $(VENV)/.installed-dev  ## the fast checks: format, lint, types, import contracts
 	$(BIN)/ruff format --check .
