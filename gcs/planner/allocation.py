@@ -12,11 +12,11 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from gcs.planner.curves import lengths, path_lengths
-from gcs.planner.fleet_cost import no_others, swarm_cost
+from gcs.planner.fleet_cost import Problem, no_others, swarm_cost
 from gcs.planner.guide_path import guide_path
 from gcs.planner.limits import path_limit_m
 from gcs.planner.problem import Route, guides, pose
-from gcs.planner.representation import bows
+from gcs.planner.representation import bows, straight_legs
 from gcs.planner.target_order import balanced_routes
 from missions.mission import Mission, Target, Vehicle
 
@@ -103,17 +103,20 @@ def _chosen(mission: Mission) -> list[list[int]]:
     targets_m = np.array([target.position_m for target in mission.targets])
     if len(targets_m) <= len(starts_m) and mission.launch_point_m is not None:
         return one_each(np.concatenate((_from_pads(mission, targets_m), np.zeros((len(targets_m),) * 2))))
-    table_m = lengths(np.concatenate((starts_m, targets_m))[:, None] - targets_m)
-
+    places_m = np.concatenate((starts_m, targets_m))
+    table_m = lengths(places_m[:, None] - targets_m)
     sides_m = SIDES * table_m**2 / max(float(table_m.max()), 1e-9)
+    template = _lengths_alone(mission)
 
     def way_lengths(wanted: list[Leg]) -> Array:
-        return _way_lengths(mission, wanted)
+        begins, ends = np.array(wanted).T
+        return _way_lengths(mission, template, places_m[begins], targets_m[ends])
 
     def one_each_on_its_side(table_m: Array) -> list[list[int]]:
         return one_each(table_m + sides_m)
 
-    return shortest(table_m, one_each_on_its_side if len(targets_m) <= len(starts_m) else balanced_routes, way_lengths)
+    solve = one_each_on_its_side if len(targets_m) <= len(starts_m) else balanced_routes
+    return shortest(table_m, solve, way_lengths)
 
 
 def _from_pads(mission: Mission, targets_m: Array) -> Array:
@@ -126,29 +129,41 @@ def _from_pads(mission: Mission, targets_m: Array) -> Array:
     return np.sum((pads_m[:, None] - targets_m) ** 2, axis=2)
 
 
-def _way_lengths(mission: Mission, wanted: list[Leg]) -> Array:
-    """(k,) lengths [m] of the shortest curves that keep the limits, or of paths through what is in the way."""
-    n, vehicles, targets = len(mission.vehicles), mission.vehicles, mission.targets
-    routes = [
-        route_of(mission, vehicles[begin], (targets[end],))
-        if begin < n
-        else Route(targets[begin - n].name, 0, np.array(targets[begin - n].position_m), (targets[end],))
-        for begin, end in wanted
-    ]
-    found_m = _bent(mission, routes)
+def _way_lengths(mission: Mission, template: Problem, begins_m: Array, ends_m: Array) -> Array:
+    """(k,) lengths [m] of the shortest ways between (k, 3) places: curves that keep the limits, or else paths."""
+    found_m = _bent(mission, template, begins_m, ends_m, bows(template.base_m.shape[1]))
     for index in np.flatnonzero(np.isinf(found_m)):
-        path_m = guide_path(mission, routes[index].start_m, routes[index].places_m[-1])
+        path_m = guide_path(mission, begins_m[index], ends_m[index])
         found_m[index] = np.inf if path_m is None else path_lengths(path_m)
     return np.where(found_m <= path_limit_m(mission), found_m, UNREACHABLE_M)
 
 
-def _bent(mission: Mission, routes: list[Route]) -> Array:
-    """(k,) lengths [m] of the shortest bow of each route that keeps its limits, infinite where none does."""
-    problem = pose(mission, routes, guides(mission, routes))
-    by_length = problem.terms._replace(length_weight=1.0, clearance_weight=0.0, height_weight=0.0, slow_cost=0.0)
-    problem = problem._replace(terms=by_length)
-    first = bows(problem.base_m.shape[1])
-    length_m, violation = np.empty((2, len(routes), len(first)))
-    for index in range(len(routes)):
-        swarm_cost(problem, index, first, no_others(), length_m[index], violation[index])
-    return np.where(violation < FLYABLE, length_m, np.inf).min(axis=1)
+def _lengths_alone(mission: Mission) -> Problem:
+    """A problem in which curves cost their lengths and whatever limits they break; its guides are of no account."""
+    vehicles, targets, count = mission.vehicles, mission.targets, max(len(mission.vehicles), len(mission.targets))
+    everywhere = [
+        route_of(mission, vehicles[index % len(vehicles)], (targets[index % len(targets)],)) for index in range(count)
+    ]
+    problem = pose(mission, everywhere, guides(mission, everywhere))
+    return problem._replace(
+        terms=problem.terms._replace(length_weight=1.0, clearance_weight=0.0, height_weight=0.0, slow_cost=0.0)
+    )
+
+
+def _bent(mission: Mission, template: Problem, begins_m: Array, ends_m: Array, first: Array) -> Array:
+    """(k,) lengths [m] of the shortest bow between places that keeps the limits, infinite where none does.
+
+    Where the straight line, the first of the bows, keeps them, the others are not looked at.
+    """
+    bases_m, axes_m = straight_legs(begins_m, ends_m, template.base_m.shape[1], mission.world.bounds)
+    problem = template._replace(base_m=bases_m, axes_m=axes_m, zones_m=np.stack((begins_m, ends_m), axis=1))
+    problem = problem._replace(pins=np.zeros((len(begins_m), 0), np.int64))
+    nobody, found_m = no_others(), np.full(len(begins_m), np.inf)
+    for index in range(len(begins_m)):
+        for tried in (first[:1], first[1:]):
+            length_m, violation = np.empty(len(tried)), np.empty(len(tried))
+            swarm_cost(problem, index, tried, nobody, length_m, violation)
+            found_m[index] = np.where(violation < FLYABLE, length_m, np.inf).min()
+            if np.isfinite(found_m[index]):
+                break
+    return found_m

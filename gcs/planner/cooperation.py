@@ -4,11 +4,17 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.planner.ecpso import Ecpso, EcpsoSettings
-from gcs.planner.fleet_cost import Problem, no_others, set_context, swarm_cost
+from gcs.planner.fleet_cost import Context, Problem, no_others, set_context, swarm_cost
+from gcs.planner.lone_descent import alone, descend_alone
+from gcs.planner.refinement import stricter
 from gcs.planner.representation import bows, fresh_bows
 
 Array = npt.NDArray[np.float64]
 
+LONE_STRICTNESS = 10.0
+"""Factor on the weight of violations in descents of single vehicles."""
+LONE_STARTS = 3
+"""First particles that are tried, where descents from the better ones do not lead to a flyable curve."""
 SWEEPS = 2
 """How often every vehicle chooses among the first particles before the search begins."""
 
@@ -42,6 +48,35 @@ class Cooperation:
             for vehicle in range(len(self._swarms)):
                 costs = self._costs(vehicle, self._first)
                 self._enter(vehicle, self._first[int(np.argmin(costs))])
+
+    def fly_alone(self, most: int, enough: float) -> Array:
+        """Give every vehicle the curve that is best without the others: the best first particle, and a descent from it.
+
+        Args:
+            most: evaluations of each descent.
+            enough: sum of squared violations with which no other first particle is tried.
+
+        Returns:
+            (vehicles,) sums of squared violations.
+        """
+        found = [self._best_alone(vehicle, most, enough) for vehicle in range(len(self._swarms))]
+        self._enter_all()
+        return np.array(found)
+
+    def _best_alone(self, vehicle: int, most: int, enough: float) -> float:
+        """Set one vehicle's offsets, and return the violation that is left."""
+        strict = alone(stricter(self.problem, LONE_STRICTNESS), vehicle)
+        order = np.argsort(self._costs(vehicle, self._first, no_others()), kind="stable")
+        least = np.inf
+        for start in order[:LONE_STARTS]:
+            offsets, cost, violation = self._first[start : start + 1].copy(), np.empty(1), np.empty(1)
+            self.curve_evaluations += descend_alone(strict, offsets, most)
+            swarm_cost(strict, 0, offsets, no_others(), cost, violation)
+            if violation[0] < least:
+                self.offsets[vehicle], least = offsets[0], float(violation[0])
+            if least < enough:
+                break
+        return least
 
     @property
     def curves_per_round(self) -> int:
@@ -93,8 +128,8 @@ class Cooperation:
         self.offsets[vehicle] = offsets
         set_context(self.problem, vehicle, offsets, self._context)
 
-    def _costs(self, vehicle: int, positions: Array) -> Array:
+    def _costs(self, vehicle: int, positions: Array, context: Context | None = None) -> Array:
         objective, violation = np.empty(len(positions)), np.empty(len(positions))
-        swarm_cost(self.problem, vehicle, positions, self._context, objective, violation)
+        swarm_cost(self.problem, vehicle, positions, context or self._context, objective, violation)
         self.curve_evaluations += len(positions)
         return objective + self.problem.terms.penalty_weight * violation

@@ -46,6 +46,12 @@ def _sampled(controls_m: Array, spacing_m: float, table: int) -> Array:
     return curves_m
 
 
+def cross(a: Array, b: Array) -> Array:
+    """(..., 3) cross products; several times as fast as `numpy.cross`."""
+    (ae, an, au), (be, bn, bu) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack((an * bu - au * bn, au * be - ae * bu, ae * bn - an * be), axis=-1)
+
+
 def path_lengths(curves_m: Array) -> Array:
     """(...,) lengths [m] of (..., m, 3) curves."""
     return lengths(np.diff(curves_m, axis=-2)).sum(axis=-1)
@@ -53,7 +59,8 @@ def path_lengths(curves_m: Array) -> Array:
 
 def lengths(vectors: Array) -> Array:
     """(...,) Euclidean lengths of (..., 3) vectors; several times as fast as `numpy.linalg.norm` along an axis."""
-    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    east, north, up = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.sqrt(east * east + north * north + up * up)
 
 
 def passing_samples(curve_m: Array, stops_m: Array) -> list[int]:
@@ -67,16 +74,15 @@ def passing_samples(curve_m: Array, stops_m: Array) -> list[int]:
 
 def curvature(curve_m: Array) -> Array:
     """(m,) curvature [1/m] of a densely sampled (m, 3) curve: of the circle through each sample and its neighbours."""
-    steps = np.diff(curve_m, axis=0)
-    before, after = steps[:-1], steps[1:]
-    step_m = lengths(steps)
-    doubled_area = lengths(np.cross(before, after))
-    inner = 2.0 * doubled_area / np.maximum(step_m[:-1] * step_m[1:] * lengths(before + after), 1e-12)
+    east, north, up = np.ascontiguousarray(np.diff(curve_m, axis=0).T)  # contiguous: four times as fast
+    step_m = np.sqrt(east * east + north * north + up * up)
+    across = east[:-1] + east[1:], north[:-1] + north[1:], up[:-1] + up[1:]
+    over_both_m = np.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
+    turned = (
+        north[:-1] * up[1:] - up[:-1] * north[1:],
+        up[:-1] * east[1:] - east[:-1] * up[1:],
+        east[:-1] * north[1:] - north[:-1] * east[1:],
+    )
+    doubled_area = np.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2)
+    inner = 2.0 * doubled_area / np.maximum(step_m[:-1] * step_m[1:] * over_both_m, 1e-12)
     return np.concatenate((inner[:1], inner, inner[-1:]))
-
-
-def distances_to_segment(points_m: Array, begin_m: Array, end_m: Array) -> Array:
-    """(n,) distances of (n, 3) points to the straight segment between two (3,) points."""
-    leg = end_m - begin_m
-    along = np.clip((points_m - begin_m) @ leg / max(float(leg @ leg), 1e-12), 0.0, 1.0)
-    return lengths(points_m - begin_m - along[:, None] * leg)

@@ -17,10 +17,15 @@ from missions import obstacles
 from missions.mission import Mission, Site
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 SPACING_M = {Site.INDOOR: 0.05, Site.OUTDOOR: 1.0}
 """Samples of a curve that is to be judged lie at most so far apart."""
+MEAN_STRIDE = 4
+"""Means are taken over every so-manyth sample: distances between vehicles change slowly."""
+COARSE_STRIDE = 16
+"""Every so-manyth sample tells which vehicles never come near one another."""
 ROUNDING = 1e-9
 """Tolerance, for the rounding of floating-point sums alone."""
 
@@ -121,7 +126,8 @@ def _near_things(mission: Mission, vehicle: TimedCurve, in_zone: BoolArray) -> I
 
 def _outside(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
     low_m, high_m = flight_box(mission)
-    out_m = np.maximum(low_m - vehicle.curve_m, vehicle.curve_m - high_m).max(axis=1)
+    east_m, north_m, up_m = np.maximum(low_m - vehicle.curve_m, vehicle.curve_m - high_m).T
+    out_m = np.maximum(np.maximum(east_m, north_m), up_m)
     yield from _most(vehicle, Limit.BOUNDS, out_m, 0.0)
 
 
@@ -145,9 +151,14 @@ def _reach(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
 def _mean_separations(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) -> Iterator[Violation]:
     """The mean over the flight, at equal fractions of the paths, of each vehicle's mean distance to the others."""
     low_m, high_m = mission.limits.mean_separation_m
-    for vehicle, own_m in zip(vehicles, fleet.places_m, strict=True):
-        apart_m = lengths(fleet.places_m - own_m).sum(axis=0) / (len(vehicles) - 1)
-        mean_m = float(np.trapezoid(apart_m) / (len(apart_m) - 1))
+    last = len(fleet.times_s) - 1
+    looked_at = np.unique(np.append(np.arange(0, last, MEAN_STRIDE), last))
+    places_m, n = fleet.places_m[:, looked_at], len(vehicles)
+    apart_m = np.zeros((n, n))
+    for i in range(n - 1):
+        flown = lengths(places_m[i + 1 :] - places_m[i])
+        apart_m[i, i + 1 :] = apart_m[i + 1 :, i] = np.trapezoid(flown, looked_at / last)
+    for vehicle, mean_m in zip(vehicles, (apart_m.sum(axis=1) / (n - 1)).tolist(), strict=True):
         if mean_m < low_m:
             yield Violation(vehicle.name, Limit.LEAST_MEAN_SEPARATION, "", mean_m, low_m)
         if mean_m > high_m:
@@ -156,44 +167,69 @@ def _mean_separations(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _
 
 def _separations(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) -> Iterator[Violation]:
     """The separation of every two vehicles at all pairs of times that lie no more than the time slack apart."""
-    n = len(vehicles)
-    for i in range(n):
-        short_m, at, shift = _closest(mission, fleet, i)
-        for j in range(n):
-            seen = j < i and shift[j] == 0  # at the same time: reported with j
-            if i == j or seen or short_m[j] <= ROUNDING:
+    ahead = _samples_ahead(mission, fleet)
+    near = _may_meet(mission, fleet, ahead)
+    for i, others in enumerate(near):
+        short_m, at, shift = _closest(mission, fleet, i, others, ahead)
+        for j, missing_m, k, later in zip(others.tolist(), short_m.tolist(), at.tolist(), shift.tolist(), strict=True):
+            seen = j < i and later == 0  # at the same time: reported with j
+            if seen or missing_m <= ROUNDING:
                 continue
-            place, time_s = fleet.places_m[i, at[j]], float(fleet.times_s[at[j]])
-            found_m = float(np.linalg.norm(place - fleet.places_m[j, at[j] + shift[j]]))
-            later_s = fleet.times_s[at[j] + shift[j]] - time_s
+            place, time_s = fleet.places_m[i, k], float(fleet.times_s[k])
+            found_m = float(np.linalg.norm(place - fleet.places_m[j, k + later]))
+            later_s = fleet.times_s[k + later] - time_s
             where = f"{_at(place, time_s)}, to {vehicles[j].name}" + (
                 f" {later_s:.1f} s later" if later_s > 0.0 else ""
             )
-            yield Violation(vehicles[i].name, Limit.SEPARATION, where, found_m, found_m + float(short_m[j]))
+            yield Violation(vehicles[i].name, Limit.SEPARATION, where, found_m, found_m + missing_m)
 
 
-def _closest(mission: Mission, fleet: _Fleet, i: int) -> tuple[Array, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Where vehicle i is nearest to each other vehicle that is as late as the time slack allows, or less.
+def _samples_ahead(mission: Mission, fleet: _Fleet) -> int:
+    """How many samples the other vehicle may be ahead at most, the time slack considered, plus one."""
+    times_s, m = fleet.times_s, len(fleet.times_s)
+    slack_s = mission.planner.time_slack_s + ROUNDING
+    return min(int((np.searchsorted(times_s, times_s + slack_s, "right") - np.arange(m)).max()), m)
+
+
+def _may_meet(mission: Mission, fleet: _Fleet, ahead: int) -> list[IntArray]:
+    """For every vehicle the others that come near enough, by few samples, to be looked at in all.
+
+    Between a sample and the nearest one that is looked at here lie at most half a stride; a vehicle cannot move farther
+    than the samples between are apart.
+    """
+    places_m = fleet.places_m[:, ::COARSE_STRIDE]
+    step_m = float(lengths(np.diff(fleet.places_m, axis=1)).max())
+    reach_m = (
+        max(mission.limits.separation_m, 2.0 * mission.limits.body_radius_m) + (2 * COARSE_STRIDE + ahead) * step_m
+    )
+    found = []
+    for i, own_m in enumerate(places_m):
+        near = lengths(places_m - own_m).min(axis=1) <= reach_m
+        near[i] = False
+        found.append(np.flatnonzero(near))
+    return found
+
+
+def _closest(mission: Mission, fleet: _Fleet, i: int, others: IntArray, ahead: int) -> tuple[Array, IntArray, IntArray]:
+    """Where vehicle i is nearest to each of some others that are as late as the time slack allows, or less.
 
     Returns:
-        Three (vehicles,): how much separation is missing [m], sample of vehicle i, samples that the other is ahead.
+        Three (others,): how much separation is missing [m], sample of vehicle i, samples that the other is ahead.
     """
-    limits, times_s, m = mission.limits, fleet.times_s, len(fleet.times_s)
-    n = len(fleet.places_m)
+    limits, times_s, m, n = mission.limits, fleet.times_s, len(fleet.times_s), len(others)
+    places_m, joined, near_start = fleet.places_m[others], fleet.joined[others], fleet.near_start[others]
     worst_m, at, shift = np.full(n, -np.inf), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    slack_s = mission.planner.time_slack_s + ROUNDING
-    most = int((np.searchsorted(times_s, times_s + slack_s, "right") - np.arange(m)).max())
-    for ahead in range(min(most, m)):
-        now, then = slice(0, m - ahead), slice(ahead, m)
-        joined = fleet.joined[i, now] & fleet.joined[:, then]
-        resting = fleet.near_start[i, now] & fleet.near_start[:, then]
-        required_m = np.where(resting, np.where(joined, 2.0 * limits.body_radius_m, 0.0), limits.separation_m)
-        short_m = required_m - lengths(fleet.places_m[:, then] - fleet.places_m[i, now])
-        short_m[:, times_s[then] - times_s[now] > slack_s] = -np.inf
+    for later in range(ahead if n else 0):
+        now, then = slice(0, m - later), slice(later, m)
+        both_joined = fleet.joined[i, now] & joined[:, then]
+        resting = fleet.near_start[i, now] & near_start[:, then]
+        required_m = np.where(resting, np.where(both_joined, 2.0 * limits.body_radius_m, 0.0), limits.separation_m)
+        short_m = required_m - lengths(places_m[:, then] - fleet.places_m[i, now])
+        short_m[:, times_s[then] - times_s[now] > mission.planner.time_slack_s + ROUNDING] = -np.inf
         where = np.argmax(short_m, axis=1)
         found_m = short_m[np.arange(n), where]
         better = found_m > worst_m
-        worst_m[better], at[better], shift[better] = found_m[better], where[better], ahead
+        worst_m[better], at[better], shift[better] = found_m[better], where[better], later
     return worst_m, at, shift
 
 

@@ -63,7 +63,7 @@ def minimise(cost: Cost, position: Array, most: int, should_stop: Callable[[], b
         found = line_search(cost, here, direction, most - here.evaluations)
         step, turn = found.position - here.position, found.gradient - here.gradient
         stalled = stalled + 1 if here.cost - found.cost <= LEAST_GAIN * abs(here.cost) else 0
-        if _inner(step, turn) > 1e-10 * _inner(turn, turn):
+        if inner(step, turn) > 1e-10 * inner(turn, turn):
             steps[known % CORRECTIONS], turns[known % CORRECTIONS] = step, turn
             known += 1
         elif found.cost == here.cost:
@@ -77,7 +77,7 @@ def line_search(cost: Cost, here: Descent, direction: Array, most: int) -> Desce
 
     The evaluations of the result are those of `here` and of the search; with no lower position found, it is `here`.
     """
-    slope, low, high, t = _inner(here.gradient, direction), 0.0, np.inf, 1.0
+    slope, low, high, t = inner(here.gradient, direction), 0.0, np.inf, 1.0
     lowest, trials = here, 0
     while trials < min(most, MOST_TRIALS):
         position = here.position + t * direction
@@ -87,7 +87,7 @@ def line_search(cost: Cost, here: Descent, direction: Array, most: int) -> Desce
             high = t
         else:
             lowest, low = Descent(position, value, gradient, 0), t
-            if _inner(gradient, direction) >= ENOUGH_FLATTENING * slope:
+            if inner(gradient, direction) >= ENOUGH_FLATTENING * slope:
                 break
         t = 0.5 * (low + high) if np.isfinite(high) else 2.0 * t
     return replace(lowest, evaluations=here.evaluations + trials)
@@ -112,18 +112,18 @@ def downhill(gradient: Array, steps: Array, turns: Array, known: int, direction:
     direction[:] = -gradient
     for back in range(kept):
         i = (known - 1 - back) % len(steps)
-        share[back] = _inner(steps[i], direction) / _inner(steps[i], turns[i])
+        share[back] = inner(steps[i], direction) / inner(steps[i], turns[i])
         direction -= share[back] * turns[i]
     i = (known - 1) % len(steps)
-    direction *= _inner(steps[i], turns[i]) / _inner(turns[i], turns[i])
+    direction *= inner(steps[i], turns[i]) / inner(turns[i], turns[i])
     for back in range(kept - 1, -1, -1):
         i = (known - 1 - back) % len(steps)
-        turned = _inner(turns[i], direction) / _inner(steps[i], turns[i])
+        turned = inner(turns[i], direction) / inner(steps[i], turns[i])
         direction += (share[back] - turned) * steps[i]
 
 
 @compiled
-def _inner(a: Array, b: Array) -> float:
+def inner(a: Array, b: Array) -> float:
     """The inner product, without the threads of a linear algebra library."""
     total = 0.0
     for i in range(len(a)):

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from gcs.planner.curves import cross, lengths
 from missions import bspline, time_law
 from missions.world import Bounds
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-UP = np.array([0.0, 0.0, 1.0])
 EAST, NORTH = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 REACH_SHARE = 0.5
@@ -88,7 +88,16 @@ def guide_along(path_m: Array, n_control: int, bounds: Bounds, stops: Sequence[i
     knots = np.concatenate(([0], np.cumsum(_shared(segments, np.diff(legs_m)))))
     where_m = np.interp(abscissae(n_control) * segments, knots, legs_m)
     base_m = time_law.resample(path_m, lengths_m, where_m)
-    return Guide(base_m, _axes(base_m[2:] - base_m[:-2], base_m, bounds), knots[1:-1].astype(np.int64) + 1)
+    reach_m = np.full(n_control - 2, REACH_SHARE * lengths_m[-1])
+    return Guide(base_m, _axes(base_m[2:] - base_m[:-2], reach_m, bounds), knots[1:-1].astype(np.int64) + 1)
+
+
+def straight_legs(begins_m: Array, ends_m: Array, n_control: int, bounds: Bounds) -> tuple[Array, Array]:
+    """Base (k, n, 3) and axes (k, n - 2, 2, 3) of the guides along k straight lines between (k, 3) places."""
+    legs_m = ends_m - begins_m
+    bases_m = begins_m[:, None] + abscissae(n_control)[:, None] * legs_m[:, None]
+    axes_m = _axes(legs_m, REACH_SHARE * lengths(legs_m), bounds)
+    return bases_m, np.repeat(axes_m[:, None], n_control - 2, axis=1)
 
 
 def _shared(segments: int, legs_m: Array) -> IntArray:
@@ -117,16 +126,13 @@ def fresh_bows(rng: np.random.Generator, count: int, n_control: int) -> Array:
     return (4.0 * heights * skewed * (1.0 - skewed)).transpose(0, 2, 1).reshape(count, 2 * len(t))
 
 
-def _axes(directions: Array, base_m: Array, bounds: Bounds) -> Array:
-    """(k, 2, 3) axes across (k, 3) directions: level to the left, and upwards."""
-    reach_m = REACH_SHARE * float(np.linalg.norm(np.diff(base_m, axis=0), axis=1).sum())
-    lengths_m = np.linalg.norm(directions, axis=1, keepdims=True)
+def _axes(directions: Array, reach_m: Array, bounds: Bounds) -> Array:
+    """(k, 2, 3) axes across (k, 3) directions, level to the left and upwards, as long as the reach and the range."""
+    lengths_m = lengths(directions)[:, None]
     along = np.where(lengths_m > 0.0, directions / np.maximum(lengths_m, 1e-9), EAST)
-    lateral = np.cross(UP, along)
-    upright = np.linalg.norm(lateral, axis=1) < 1e-6
-    lateral[upright] = NORTH
-    lateral /= np.linalg.norm(lateral, axis=1, keepdims=True)
+    lateral = np.stack((-along[:, 1], along[:, 0], np.zeros(len(along))), axis=-1)
+    lateral[lengths(lateral) < 1e-6] = NORTH
+    lateral /= lengths(lateral)[:, None]
     size_m = bounds.high_enu_m - bounds.low_enu_m
-    return np.stack(
-        (lateral * min(reach_m, max(size_m[:2])), np.cross(along, lateral) * min(reach_m, size_m[2])), axis=1
-    )
+    reaches_m = np.minimum(reach_m[:, None], [max(size_m[:2]), size_m[2]])[..., None]
+    return reaches_m * np.stack((lateral, cross(along, lateral)), axis=1)

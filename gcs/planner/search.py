@@ -23,17 +23,27 @@ from gcs.planner.refinement import Refined, Stage, refine
 from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
-QUICK = (Stage(1.0, 40), Stage(10.0, 20), Stage(100.0, 20))
+QUICK = (Stage(1.0, 20), Stage(30.0, 20), Stage(1000.0, 20))
 """Polish of the first particles: a feasible plan soon."""
-THOROUGH = (Stage(1.0, 60), Stage(10.0, 40), Stage(100.0, 20))
+LONE_EVALUATIONS = 60
+"""Of the first descent of each vehicle."""
+THOROUGH = (Stage(1.0, 50), Stage(10.0, 30), Stage(100.0, 20), Stage(1000.0, 20))
 """Polish of what a round of the swarms has found."""
 MEND = (Stage(1000.0, 40),)
-"""Polish of a plan that is all but feasible."""
+"""Polish of a plan that is all but feasible ..."""
+REPAIR = (Stage(10.0, 20), Stage(1000.0, 30))
+"""... or that the judge refused, once the search looks closer."""
+INSISTENT = ((Stage(100.0, 40),), (Stage(1000.0, 40),))
+"""Polish of a first plan that is not feasible yet, but nearly."""
+NEARLY_FEASIBLE = 0.1
+STUCK = 1e-2
+"""A vehicle that cannot get below this sum of squared violations alone is given a guide path at once."""
 LOOKS_FEASIBLE = 1e-4
-"""A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge ..."""
+"""A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge, ..."""
 SHOULD_BE_FEASIBLE = 1e-6
-"""... and one with less than this that the judge refuses was not looked at closely enough."""
+"""... but first mended if it has more than this."""
 WORTH_JUDGING = 1e-3
 """Relative gain over the best plan so far that makes the judge look before the end."""
 PATIENCE = 2
@@ -91,8 +101,7 @@ class FleetSearch:
 
     def run(self) -> Candidate:
         """Search until the budget is used up: the best plan that the judge approved, or the least bad one."""
-        self._swarms.start()
-        self._polish(QUICK)
+        self._begin(QUICK)
         self._report()
         while self._budget.share_done(self.evaluations) < 1.0 and not self._budget.interrupted():
             if self._budget.left(self.evaluations) > self._swarms.curves_per_round / len(self._routes):
@@ -100,7 +109,7 @@ class FleetSearch:
                 self._iterations += self._settings.window
             self._polish(THOROUGH)
             if self._best is None and self._iterations % (PATIENCE * self._settings.window) == 0 and self._has_time():
-                self._find_ways_around()
+                self._find_ways_around(self._swarms.violations_alone(self._swarms.offsets) > LOOKS_FEASIBLE)
             self._report()
         assert self._present is not None
         if self._best is not None and self._best.cost <= self._present.objective:
@@ -108,13 +117,34 @@ class FleetSearch:
         last = self._judged(self._present.offsets)
         return last if self._best is None or not last.violations else self._best.candidate
 
+    def _begin(self, stages: tuple[Stage, ...]) -> None:
+        """The first plan: every vehicle as if it were alone; where that fails, with an eye on the others."""
+        alone = self._swarms.fly_alone(LONE_EVALUATIONS, STUCK)
+        if self._detours == 0 and self._find_ways_around(alone > STUCK):
+            return
+        self._polish(stages)
+        self._insist()
+        if self._best is None and not self._budget.interrupted():
+            self._swarms.start()
+            self._polish(stages)
+
+    def _insist(self) -> None:
+        """Go on with a plan that is nearly feasible, as long as that brings it nearer."""
+        for stages in INSISTENT:
+            if self._best is not None or self._present is None or self._present.violation > NEARLY_FEASIBLE:
+                return
+            self._polish_from(self._present.offsets, stages)
+
     def _has_time(self) -> bool:
         """Whether starting afresh may still lead to something."""
         return self._budget.left(self.evaluations) > AFRESH_EVALUATIONS
 
     def _polish(self, stages: tuple[Stage, ...]) -> None:
         """Polish the swarms' plan; take it over if it is better than the present one, and let the judge see it."""
-        refined = self._refined(self._swarms.offsets, stages)
+        self._polish_from(self._swarms.offsets, stages)
+
+    def _polish_from(self, offsets: Array, stages: tuple[Stage, ...]) -> None:
+        refined = self._refined(offsets, stages)
         improved = self._present is None or self._merit(refined) < self._merit(self._present)
         if self._present is None or improved:
             self._present = refined
@@ -130,24 +160,28 @@ class FleetSearch:
         return refined
 
     def _show_judge(self, refined: Refined) -> None:
-        candidate = self._judged(refined.offsets)
-        if candidate.violations and refined.violation > SHOULD_BE_FEASIBLE:
+        if refined.violation > SHOULD_BE_FEASIBLE:
             self._present = refined = self._refined(refined.offsets, MEND)
-            candidate = self._judged(refined.offsets)
+        candidate = self._judged(refined.offsets)
         if candidate.violations:
-            self._look_closer()
+            self._look_closer(refined.offsets)
             return
         if self._best is None:
             self._budget = self._budget.settled(self.evaluations)
         if self._best is None or refined.objective < self._best.cost:
             self._best = Approved(candidate, refined.objective)
 
-    def _find_ways_around(self) -> None:
+    def _find_ways_around(self, stuck: BoolArray) -> bool:
         """Give vehicles that cannot even fly alone a guide path around what is in their way, and start afresh.
 
         Each further time the path keeps farther away from everything, and the curves get more control points.
+
+        Args:
+            stuck: (vehicles,) which they are.
+
+        Returns:
+            Whether there was anything to start afresh with.
         """
-        stuck = self._swarms.violations_alone(self._swarms.offsets) > LOOKS_FEASIBLE
         for index in np.flatnonzero(stuck):
             way = guide_way(self._mission, self._routes[index], WIDER**self._detours)
             if way is not None:
@@ -155,7 +189,7 @@ class FleetSearch:
             elif self._detours == 0:  # as far as can be told, there is none: no use in being stubborn
                 self._budget = self._budget.settled(self.evaluations)
         if not stuck.any() or not any(self._ways):
-            return
+            return False
         ways = [way or route.straight for way, route in zip(self._ways, self._routes, strict=True)]
         n_control = control_points(self._mission, ways, POINTS_PER_CORNER * (1 + self._detours))
         self._detours += 1
@@ -163,10 +197,10 @@ class FleetSearch:
         self._problem = pose(self._mission, self._routes, self._guides, self._care)
         self._swarms = self._swarms.again(self._problem)
         self._present = None
-        self._swarms.start()
-        self._polish(THOROUGH)
+        self._begin(THOROUGH)
+        return True
 
-    def _look_closer(self) -> None:
+    def _look_closer(self, offsets: Array) -> None:
         """Mend a breach that the search did not see, and see such ones from now on."""
         if self._raises == MOST_RAISES:
             return
@@ -175,7 +209,7 @@ class FleetSearch:
         self._problem = pose(self._mission, self._routes, self._guides, self._care)
         self._swarms.pose(self._problem)
         self._present = None
-        self._polish(THOROUGH)
+        self._polish_from(offsets, REPAIR)
 
     def _merit(self, refined: Refined) -> float:
         return refined.objective + MERIT_STRICTNESS * self._problem.terms.penalty_weight * refined.violation

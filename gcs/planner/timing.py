@@ -16,6 +16,7 @@ from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
 
 UP_TO_SPEED = 0.95
 """Where the fleet does not get to this share of cruise speed between two obstacles, it does not speed up at all."""
@@ -65,10 +66,14 @@ def _held_back(slow: BoolArray, law_m_s: Array, cruise_m_s: float) -> BoolArray:
     """`slow`, drawn out backwards over the braking before it, and over gaps too short to get up to speed in."""
     if not slow.any():
         return slow
-    held = slow.copy()
     braking = np.append(np.diff(law_m_s) < 0.0, False)
-    for i in range(len(held) - 2, -1, -1):
-        held[i] |= held[i + 1] and braking[i]
+    held = _first_from_here(slow) <= _first_from_here(~braking)
     for run in np.split(np.arange(len(held)), np.flatnonzero(np.diff(held)) + 1)[1:-1]:
         held[run] |= law_m_s[run].max() < UP_TO_SPEED * cruise_m_s
     return held
+
+
+def _first_from_here(true: BoolArray) -> IntArray:
+    """(m,) for every sample, the index of the first one from it on where something is true; m if there is none."""
+    m = len(true)
+    return np.minimum.accumulate(np.where(true, np.arange(m), m)[::-1])[::-1]

@@ -1,17 +1,17 @@
 """From a dense curve to the few track points and leg speeds that an autopilot is given."""
 
-import itertools
-
 import numpy as np
 import numpy.typing as npt
 
-from gcs.planner.curves import distances_to_segment, passing_samples, path_lengths
+from gcs.planner.curves import passing_samples, path_lengths
 from gcs.planner.timing import Timing
+from missions.kernels import compiled
 from missions.mission import Mission, Site
 from missions.mission_items import Track
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 MOST_POINTS = 20
 TOLERANCE_SHARE = 1.0 / 6.0
@@ -45,18 +45,49 @@ def sample_track(mission: Mission, curve_m: Array, timing: Timing, stops_m: Arra
     return Track(points_m, _leg_speeds(mission, curve_m, timing, kept))
 
 
-def _thinned(curve_m: Array, fixed: IntArray, tolerance_m: float) -> list[int]:
-    """Indices of samples between which straight legs stay within `tolerance_m` (Douglas and Peucker)."""
-    kept, stack = {0}, list(itertools.pairwise(fixed.tolist()))
-    while stack:
-        begin, end = stack.pop()
-        off_m = distances_to_segment(curve_m[begin : end + 1], curve_m[begin], curve_m[end])
-        worst = int(np.argmax(off_m))
-        if off_m[worst] > tolerance_m:
-            stack += [(begin, begin + worst), (begin + worst, end)]
-        else:
-            kept.add(end)
-    return sorted(kept)
+def _thinned(curve_m: Array, fixed: IntArray, tolerance_m: float) -> IntArray:
+    """Indices of samples between which straight legs stay within `tolerance_m`; those that are fixed among them."""
+    kept = np.zeros(len(curve_m), np.bool_)
+    kept[fixed] = True
+    thin(curve_m, fixed, tolerance_m, kept)
+    return np.flatnonzero(kept)
+
+
+@compiled
+def thin(curve_m: Array, fixed: IntArray, tolerance_m: float, kept: BoolArray) -> None:
+    """Mark the samples of an (m, 3) curve that Douglas and Peucker keep between the fixed ones."""
+    begins, ends = np.empty(len(curve_m), np.int64), np.empty(len(curve_m), np.int64)
+    waiting = len(fixed) - 1
+    begins[:waiting], ends[:waiting] = fixed[:-1], fixed[1:]
+    while waiting > 0:
+        waiting -= 1
+        begin, end = begins[waiting], ends[waiting]
+        farthest, worst = tolerance_m, -1
+        for i in range(begin + 1, end):
+            off_m = _distance_to_leg(curve_m, i, begin, end)
+            if off_m > farthest:
+                farthest, worst = off_m, i
+        if worst >= 0:
+            kept[worst] = True
+            begins[waiting], ends[waiting] = begin, worst
+            begins[waiting + 1], ends[waiting + 1] = worst, end
+            waiting += 2
+
+
+@compiled
+def _distance_to_leg(curve_m: Array, i: int, begin: int, end: int) -> float:
+    """Distance of a sample to the straight leg between two others."""
+    squared, along = 0.0, 0.0
+    for axis in range(3):
+        leg_m = curve_m[end, axis] - curve_m[begin, axis]
+        along += (curve_m[i, axis] - curve_m[begin, axis]) * leg_m
+        squared += leg_m * leg_m
+    along = min(max(along / max(squared, 1e-12), 0.0), 1.0)
+    squared = 0.0
+    for axis in range(3):
+        foot_m = curve_m[begin, axis] + along * (curve_m[end, axis] - curve_m[begin, axis])
+        squared += (curve_m[i, axis] - foot_m) ** 2
+    return np.sqrt(squared)
 
 
 def _leg_speeds(mission: Mission, curve_m: Array, timing: Timing, kept: IntArray) -> Array:

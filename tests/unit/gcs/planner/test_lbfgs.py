@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize, rosen, rosen_der
 
+from gcs.planner.allocation import allocate
+from gcs.planner.fleet_cost import fleet_cost
 from gcs.planner.lbfgs import CORRECTIONS, Descent, downhill, line_search, minimise
+from gcs.planner.lone_descent import alone, descend_alone
+from gcs.planner.problem import guides, pose
+from gcs.planner.representation import bows
+from missions.mission import load_mission
 
 
 def never() -> bool:
@@ -83,3 +89,23 @@ def test_a_line_search_that_finds_nothing_lower_stays_where_it_is():
     found = line_search(valley_of_kinks, here, here.gradient, 10)  # uphill
     np.testing.assert_array_equal(found.position, here.position)
     assert (found.cost, found.evaluations) == (here.cost, 13)
+
+
+@pytest.mark.parametrize("mission", ["terrain-2-5uav", "indoor"])
+@pytest.mark.parametrize("most", [1, 2, 30, 400])
+def test_the_compiled_descent_of_a_single_vehicle_takes_the_same_steps(mission: str, most: int):
+    loaded = load_mission(mission)
+    routes = allocate(loaded)
+    problem = alone(pose(loaded, routes, guides(loaded, routes)), 1)
+    weight = problem.terms.penalty_weight
+    first = bows(problem.base_m.shape[1])[9:10]
+
+    def cost(offsets: np.ndarray) -> tuple[float, np.ndarray]:
+        gradient = np.empty_like(first)
+        objective, violation = fleet_cost(problem, offsets.reshape(first.shape), gradient)
+        return objective + weight * violation, gradient.ravel()
+
+    expected = minimise(cost, first.ravel(), most, lambda: False)
+    found = first.copy()
+    assert descend_alone(problem, found, most) == expected.evaluations
+    np.testing.assert_allclose(found.ravel(), expected.position, rtol=1e-9)

@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from gcs.planner.curves import curvature, dense_curves, distances_to_segment, path_lengths
+from gcs.planner.curves import cross, curvature, dense_curves, path_lengths
 from gcs.planner.timing import Timing, common_timing
-from gcs.planner.track_points import MOST_POINTS, sample_track
+from gcs.planner.track_points import MOST_POINTS, sample_track, thin
 from missions import obstacles, time_law
 from missions.mission import Mission, load_mission
 from tests.unit.gcs.planner.worlds import room, wall
@@ -18,6 +18,22 @@ NO_STOPS = np.empty((0, 3))
 def lines(*ends: tuple[tuple[float, ...], tuple[float, ...]], count: int = 600) -> np.ndarray:
     """(vehicles, m, 3) straight curves."""
     return np.array([np.linspace(begin, end, count) for begin, end in ends])
+
+
+def distances_to_segment(points_m: np.ndarray, begin_m: np.ndarray, end_m: np.ndarray) -> np.ndarray:
+    """(n,) distances of (n, 3) points to the straight segment between two (3,) points."""
+    leg = end_m - begin_m
+    along = np.clip((points_m - begin_m) @ leg / max(float(leg @ leg), 1e-12), 0.0, 1.0)
+    return np.linalg.norm(points_m - begin_m - along[:, None] * leg, axis=1)
+
+
+def douglas_peucker(curve_m: np.ndarray, begin: int, end: int, tolerance_m: float) -> set[int]:
+    off_m = distances_to_segment(curve_m[begin : end + 1], curve_m[begin], curve_m[end])
+    worst = begin + int(np.argmax(off_m))
+    if off_m.max() <= tolerance_m:
+        return {begin, end}
+    halves = (begin, worst), (worst, end)
+    return set().union(*(douglas_peucker(curve_m, *half, tolerance_m) for half in halves))
 
 
 def timed(mission: Mission, curves_m: np.ndarray) -> Timing:
@@ -150,3 +166,19 @@ def test_targets_on_the_way_are_points_of_the_track_in_their_order():
     first, second = (np.flatnonzero(np.all(track.points_m == stop_m, axis=1)) for stop_m in stops_m)
     assert len(first) == len(second) == 1
     assert first[0] < second[0] < len(track.points_m) - 1
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_compiled_thinning_is_that_of_douglas_and_peucker(seed: int):
+    rng = np.random.default_rng(seed)
+    curve_m = np.cumsum(rng.normal(0.0, 1.0, (300, 3)), axis=0)
+    fixed, kept = np.array([0, 120, 299]), np.zeros(300, bool)
+    kept[fixed] = True
+    thin(curve_m, fixed, 2.0, kept)
+    expected = douglas_peucker(curve_m, 0, 120, 2.0) | douglas_peucker(curve_m, 120, 299, 2.0)
+    assert set(np.flatnonzero(kept).tolist()) == expected
+
+
+def test_cross_products_are_those_of_numpy():
+    a, b = np.random.default_rng(1).normal(size=(2, 4, 5, 3))
+    np.testing.assert_allclose(cross(a, b), np.cross(a, b), atol=1e-12)
