@@ -4,10 +4,10 @@ Layers, each importing only what stands below it:
 
     command                                  runs what is missing, writes rows, pictures and a summary
     catalogue                                experiments by name
-    table2, ...                              one experiment each
+    ackley, allocation, paths, convergence, table2, ablation, scaling    one experiment each
     runner, executors                        runs on this machine's cores, or on a Dask cluster
-    warm_up, trials                          one search, measured
+    trials                                   one search, measured
     ledger                                   the CSV file; interrupted experiments go on
-    drawing, markdown, statistics, paper     pictures, tables, tests, the paper's numbers
+    drawing, scenery, markdown, series, statistics, paper    pictures, tables, tests, the paper's numbers
     experiment                               what an experiment consists of
 """

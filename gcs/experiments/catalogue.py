@@ -1,10 +1,11 @@
 """All experiments by name."""
 
 from gcs.errors import UsageError
-from gcs.experiments import table2
+from gcs.experiments import ablation, ackley, allocation, convergence, paths, scaling, table2
 from gcs.experiments.experiment import Experiment
 
-EXPERIMENTS: dict[str, Experiment] = {each.EXPERIMENT.name: each.EXPERIMENT for each in (table2,)}
+_MODULES = (ackley, allocation, paths, convergence, table2, ablation, scaling)
+EXPERIMENTS: dict[str, Experiment] = {module.EXPERIMENT.name: module.EXPERIMENT for module in _MODULES}
 
 
 def find_experiment(name: str) -> Experiment:

@@ -1,6 +1,5 @@
 """Doing the runs of an experiment that are not done yet, on any `concurrent.futures.Executor`."""
 
-import functools
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -8,7 +7,6 @@ from concurrent.futures.process import BrokenProcessPool
 from gcs.errors import ProcessFailed
 from gcs.experiments.experiment import Experiment, Row, Run
 from gcs.experiments.ledger import Ledger
-from gcs.experiments.warm_up import warm_up
 
 
 def outstanding(experiment: Experiment, seeds: Sequence[int], ledger: Ledger) -> list[Run]:
@@ -41,7 +39,7 @@ def perform(
     waiting: dict[Future[Row], Run] = {}
     try:
         for run in runs:
-            waiting[executor.submit(functools.partial(_warm_work, experiment.work), run)] = run
+            waiting[executor.submit(experiment.work, run)] = run
         for future in as_completed(waiting):
             run = waiting[future]
             ledger.append(run, future.result())
@@ -51,9 +49,3 @@ def perform(
     finally:
         for future in waiting:
             future.cancel()
-
-
-def _warm_work(work: Callable[[Run], Row], run: Run) -> Row:
-    """Do a run, after everything is compiled, so that its CPU time is that of the run."""
-    warm_up()
-    return work(run)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from scipy.stats import mannwhitneyu
+from scipy.stats import mannwhitneyu, wilcoxon
 
 from gcs.experiments.experiment import Cell, Row
 
@@ -29,12 +29,12 @@ def quartiles(values: Sequence[float]) -> tuple[float, float, float]:
     return float(low), float(middle), float(high)
 
 
-def spread(values: Sequence[float], digits: int = 1) -> str:
-    """Median and quartiles as text; a dash where there is nothing."""
+def spread(values: Sequence[float], form: str = ".1f") -> str:
+    """Median and quartiles as text, each in such a format; a dash where there is nothing."""
     if not values:
         return "–"
     low, middle, high = quartiles(values)
-    return f"{middle:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
+    return f"{middle:{form}} [{low:{form}}, {high:{form}}]"
 
 
 def rank_sum_p(one: Sequence[float], other: Sequence[float]) -> float | None:
@@ -47,6 +47,15 @@ def rank_sum_p(one: Sequence[float], other: Sequence[float]) -> float | None:
     if len(set(one) | set(other)) == 1:
         return 1.0
     return float(mannwhitneyu(one, other, alternative="two-sided").pvalue)
+
+
+def signed_rank_p(one: Sequence[float], other: Sequence[float]) -> float | None:
+    """p-value of Wilcoxon's signed-rank test of pairs, two-sided: None where there are too few to tell anything."""
+    differences = np.subtract(one, other)
+    if np.count_nonzero(differences) < 2:
+        return None
+    _, p = np.asarray(wilcoxon(differences, alternative="two-sided"))
+    return float(p)
 
 
 def significance(p: float | None) -> str:
