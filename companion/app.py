@@ -20,7 +20,7 @@ from companion.planner.planner import Plan, Planner, PlanRequest
 from companion.settings import CompanionSettings
 from companion.vehicle_clock import VehicleClock
 from missions import tunnel
-from missions.tunnel import PayloadType
+from missions.tunnel import PayloadType, TrajectoryMessage
 
 T = TypeVar("T")
 
@@ -167,9 +167,16 @@ class App:
             case instructions.SendStatus(status):
                 self.autopilot.send_tunnel(PayloadType.COMPANION_STATUS, tunnel.encode_status(status))
             case instructions.SendTrajectory(message):
-                self.autopilot.send_tunnel(PayloadType.TRAJECTORY, tunnel.encode_trajectory(message))
+                self._announce(message)
             case instructions.Note(text, fields):
                 self.journal.write(self._now_s, text, **fields)
+
+    def _announce(self, message: TrajectoryMessage) -> None:
+        """Tell the others; what cannot be told is flown all the same."""
+        try:
+            self.autopilot.send_tunnel(PayloadType.TRAJECTORY, tunnel.encode_trajectory(message))
+        except ValueError as too_large:
+            self.journal.write(self._now_s, "trajectory not announced", problem=str(too_large))
 
     def _later(self, action: Coroutine[None, None, None]) -> None:
         """Carry out something that takes time, beside everything else."""

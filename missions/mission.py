@@ -127,7 +127,8 @@ class PlannerSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 class OnboardSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How far and how finely the companions plan."""
 
-    horizon_m: Positive = 7.5
+    horizon_m: Annotated[float, msgspec.Meta(gt=0.0, le=250.0)] = 7.5
+    """What a trajectory message reaches over ends the horizon."""
     voxel_m: Positive = 0.1
 
 

@@ -67,7 +67,7 @@ class Reason(IntEnum):
 
 
 class TrajectoryMessage(msgspec.Struct, frozen=True, kw_only=True):
-    """A trajectory that a vehicle flies or wants to fly: 36 bytes of header, then int16 centimetres.
+    """A trajectory that a vehicle flies or wants to fly: 38 bytes of header, then int16 centimetres.
 
     Positions are mission ENU [m]; times are UTC [s], since vehicles share no other clock.
     """
@@ -98,7 +98,7 @@ class CompanionStatus(msgspec.Struct, frozen=True, kw_only=True):
     time_boot_ms: int = 0
 
 
-_TRAJECTORY = struct.Struct("<BBBxIIQiiiHH")
+_TRAJECTORY = struct.Struct("<BBBxIIQiiiIH")
 _POINT = struct.Struct("<hhh")
 _STATUS = struct.Struct("<BBBxIIHHHHHHI")
 _KNOT_UNIT_S = 1e-4

@@ -2,6 +2,7 @@
 
 import importlib
 import math
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -128,13 +129,19 @@ def trajectory_message(n_points: int = 12) -> TrajectoryMessage:
     return TrajectoryMessage(kind=TrajectoryKind.COMMITTED, plan_id=7, revision=3, radius_m=0.2, trajectory=trajectory)
 
 
-def test_a_trajectory_of_twelve_points_takes_108_bytes_and_survives_the_wire():
+def test_a_trajectory_of_twelve_points_takes_110_bytes_and_survives_the_wire():
     payload = encode_trajectory(trajectory_message())
     back = decode_trajectory(payload)
-    assert len(payload) == 108
+    assert len(payload) == 110
     np.testing.assert_allclose(back.trajectory.control_points_m, trajectory_message().trajectory.control_points_m)
     assert back.trajectory.start_s == pytest.approx(1_700_000_000.25, abs=1e-6)
     assert (back.kind, back.plan_id, back.revision) == (TrajectoryKind.COMMITTED, 7, 3)
+
+
+def test_a_slow_climb_over_minutes_survives_the_wire():
+    slow = trajectory_message()
+    slow = msgspec.structs.replace(slow, trajectory=replace(slow.trajectory, knot_interval_s=65.5361))
+    assert decode_trajectory(encode_trajectory(slow)).trajectory.knot_interval_s == pytest.approx(65.5361)
 
 
 def test_a_trajectory_that_does_not_fit_is_refused():
@@ -152,7 +159,7 @@ def test_random_payloads_decode_or_are_refused_and_nothing_else(payload: bytes):
             continue
 
 
-@given(cut=st.integers(0, 107))
+@given(cut=st.integers(0, 109))
 def test_truncated_trajectories_are_refused(cut: int):
     with pytest.raises(WireFormatError):
         decode_trajectory(encode_trajectory(trajectory_message())[:cut])
