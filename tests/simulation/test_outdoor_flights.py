@@ -27,5 +27,6 @@ def test_one_vehicle_climbs_out_over_the_terrain_and_holds_at_its_target():
     (flown,) = system.flown().values()
     assert np.linalg.norm(flown.positions_m[-1] - FAR_M) < TERRAIN.site.arrival_tolerance_m
     moved = flown.in_flight()
-    assert np.linalg.norm(moved.velocities_m_s, axis=1).max() <= TERRAIN.limits.cruise_speed_m_s
+    noise_m_s = 3.0 * TERRAIN.simulation.positioning.velocity_std_m_s  # it flies by its estimate, not by the truth
+    assert np.linalg.norm(moved.velocities_m_s, axis=1).max() <= TERRAIN.limits.cruise_speed_m_s + noise_m_s
     assert obstacles.clearance(moved.positions_m, obstacles.pack(TERRAIN.world)).min() > 0.0
