@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-planner check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -44,6 +44,9 @@ test-all: $(VENV)/.installed-dev  ## every test, the slow ones too
 	@$(BIN)/python -m tests.browser.chromium
 	$(TEST) -n 2 -m "not processes and not browser"
 	$(TEST) -m "processes or browser"
+
+bench-sitl: $(VENV)/.installed-dev  ## what the simulator costs: CPU, memory, pace, boot, with the required figures
+	$(BIN)/python -m tests.benchmarks.sitl
 
 check-px4: install  ## fly the whole sequence on an autopilot that is there: make check-px4 LINK=udpin://0.0.0.0:14550
 	@test -n "$(LINK)" || { echo "usage: make check-px4 LINK=udpin://0.0.0.0:14550 [SPEED=1]"; exit 2; }

@@ -19,7 +19,7 @@ from sitl.dynamics.airframe import AirframeName
 from sitl.errors import BadPlace, SitlError
 from sitl.open_field import open_field
 from sitl.service import serve
-from sitl.settings import HIGHEST_INSTANCE_BASE, Settings
+from sitl.settings import COMPANION_PORT, HIGHEST_INSTANCE_BASE, HIGHEST_ONBOARD_PORT, ONBOARD_PORT, Settings
 from sitl.simulator import Simulator
 
 BAD_USAGE = 2
@@ -43,17 +43,28 @@ def fly(
     instance_base: Annotated[int, typer.Option(min=0, max=HIGHEST_INSTANCE_BASE, help="Shift all ports by this.")] = 0,
     origin: Annotated[str | None, typer.Option(help="LAT,LON,ALT: move the mission there.")] = None,
     airframe: Annotated[AirframeName, typer.Option(help="The body of all vehicles.")] = AirframeName.X500_LIKE,
+    onboard_ports: Annotated[
+        str, typer.Option(metavar="OWN:PEER", help="First ports of the onboard links and of the companions.")
+    ] = f"{ONBOARD_PORT}:{COMPANION_PORT}",
     supervised: Annotated[bool, typer.Option("--supervised", help="End when standard input does.")] = False,
 ) -> None:
     """Simulate the vehicles of a mission, each an autopilot with PX4's manners on two UDP ports.
 
     Vehicle i talks to the ground station on UDP 14550 from port 18570+(i-1), and to its companion on
-    14540+(i-1) from 14580+(i-1). Ctrl-C ends it.
+    14540+(i-1) from 14580+(i-1); --onboard-ports moves these. Ctrl-C ends it.
     """
     if (mission is None) == (vehicles is None):
         raise typer.BadParameter("expected a MISSION or --vehicles, one of the two")
+    onboard_port, companion_port = _ports(onboard_ports)
     settings = Settings(
-        speed=speed, seed=seed, truth=truth, instance_base=instance_base, airframe=airframe, supervised=supervised
+        speed=speed,
+        seed=seed,
+        truth=truth,
+        instance_base=instance_base,
+        airframe=airframe,
+        onboard_port=onboard_port,
+        companion_port=companion_port,
+        supervised=supervised,
     )
     try:
         flown = _mission(mission, vehicles, origin)
@@ -104,6 +115,19 @@ def _place(text: str) -> GeodeticPoint:
     if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0 and -500.0 <= altitude <= 9000.0):
         raise BadPlace(text)
     return GeodeticPoint(latitude_deg=latitude, longitude_deg=longitude, altitude_amsl_m=altitude)
+
+
+def _ports(text: str) -> tuple[int, int]:
+    """The two ports of `--onboard-ports`.
+
+    Raises:
+        typer.BadParameter: they are none.
+    """
+    own, _, peer = text.partition(":")
+    if not all(port.isdecimal() and 1024 <= int(port) <= HIGHEST_ONBOARD_PORT for port in (own, peer)):
+        expected = f"expected two ports from 1024 to {HIGHEST_ONBOARD_PORT}"
+        raise typer.BadParameter(f"--onboard-ports: {expected}, as in {ONBOARD_PORT}:{COMPANION_PORT}, found {text!r}")
+    return int(own), int(peer)
 
 
 @contextmanager

@@ -8,6 +8,8 @@ from sitl.dynamics.airframe import AirframeName
 GROUND_PORT, GCS_PORT = 18570, 14550
 ONBOARD_PORT, COMPANION_PORT = 14580, 14540
 HIGHEST_INSTANCE_BASE = 65535 - GROUND_PORT - 250
+HIGHEST_ONBOARD_PORT = GROUND_PORT - 250
+"""As far as any instance base leaves room for 250 vehicles."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +24,10 @@ class Settings:
     instance_base: int = 0
     """Added to all ports."""
     airframe: AirframeName = AirframeName.X500_LIKE
+    onboard_port: int = ONBOARD_PORT
+    """Of the first vehicle's onboard link; the others' follow."""
+    companion_port: int = COMPANION_PORT
+    """Of the first vehicle's companion; the others' follow."""
     supervised: bool = False
     """End when standard input does."""
     host: str = "127.0.0.1"

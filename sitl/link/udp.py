@@ -1,16 +1,16 @@
 """The sockets of a fleet: two UDP ports per vehicle, one MAVLink message per datagram, paced by the loop's clock."""
 
 import asyncio
-import contextlib
 import errno
 import socket
 import sys
+from typing import NamedTuple
 
 from sitl.errors import PortInUse
 from sitl.fleet import TICK_S
 from sitl.link.truth_log import TruthLog
 from sitl.microservices.outbox import Link
-from sitl.settings import COMPANION_PORT, GCS_PORT, GROUND_PORT, ONBOARD_PORT, Settings
+from sitl.settings import GCS_PORT, GROUND_PORT, Settings
 from sitl.simulator import Simulator
 
 SLIP_S = 0.1
@@ -21,6 +21,16 @@ MOST_AT_ONCE = 64
 """Datagrams of one port that are taken in before the others have their turn."""
 
 Address = tuple[str, int]
+End = tuple[socket.socket, Address | None]
+
+
+class _Port(NamedTuple):
+    """Where one link of one vehicle is bound, and who is at its other end."""
+
+    sysid: int
+    link: Link
+    own: int
+    peer: int | None
 
 
 class FleetLinks:
@@ -34,7 +44,7 @@ class FleetLinks:
     def __init__(self, simulator: Simulator, settings: Settings) -> None:
         self._simulator = simulator
         self._settings = settings
-        self._ends: dict[bool, dict[int, tuple[socket.socket, Address]]] = {True: {}, False: {}}
+        self._ends: dict[bool, dict[int, End]] = {True: {}, False: {}}
         """Is it the ground link -> system id -> socket and peer."""
 
     def open(self) -> None:
@@ -44,22 +54,23 @@ class FleetLinks:
             PortInUse: naming the port.
         """
         try:
-            for sysid in self._simulator.vehicles:
-                shift = self._settings.instance_base
-                self._open_one(sysid, Link.GROUND, GROUND_PORT + sysid - 1 + shift, GCS_PORT + shift)
-                self._open_one(
-                    sysid, Link.ONBOARD, ONBOARD_PORT + sysid - 1 + shift, COMPANION_PORT + sysid - 1 + shift
-                )
+            for port in self._ports():
+                self._open_one(port)
         except BaseException:
             self.close()
             raise
 
     def send(self) -> None:
         """Send everything that the simulator has to send; what the kernel has no room for is lost, as on any link."""
+        ground, onboard = self._ends[True], self._ends[False]
         for sysid, link, frame in self._simulator.transmissions():
-            end, peer = self._ends[link is Link.GROUND][sysid]
-            with contextlib.suppress(OSError):
+            end, peer = (ground if link is Link.GROUND else onboard)[sysid]
+            if peer is None:
+                continue
+            try:  # noqa: SIM105 - suppress() would double the cost of a datagram
                 end.sendto(frame, peer)
+            except OSError:
+                pass
 
     def close(self) -> None:
         for ends in self._ends.values():
@@ -68,11 +79,26 @@ class FleetLinks:
                 end.close()
             ends.clear()
 
-    def _open_one(self, sysid: int, link: Link, port: int, peer_port: int) -> None:
+    def _ports(self) -> list[_Port]:
+        """All ports to be opened.
+
+        The peer of an onboard link may be a port that is ours already, or the ground station's: with the usual ports,
+        that of vehicle 11 and those from 41 on. No companion can be there, and the link stays silent.
+        """
+        settings, shift = self._settings, self._settings.instance_base
+        sysids = list(self._simulator.vehicles)
+        ground = [_Port(i, Link.GROUND, GROUND_PORT + i - 1 + shift, GCS_PORT + shift) for i in sysids]
+        own, peer = settings.onboard_port - 1 + shift, settings.companion_port - 1 + shift
+        onboard = [_Port(i, Link.ONBOARD, own + i, peer + i) for i in sysids]
+        taken = {port.own for port in ground + onboard} | {GCS_PORT + shift}
+        return ground + [port._replace(peer=None) if port.peer in taken else port for port in onboard]
+
+    def _open_one(self, port: _Port) -> None:
         host = self._settings.host
-        end = _bind(host, port, f"{link.value} link of vehicle {sysid}")
-        self._ends[link is Link.GROUND][sysid] = end, (host, peer_port)
-        asyncio.get_running_loop().add_reader(end, self._receive, sysid, link, end)
+        end = _bind(host, port.own, f"{port.link.value} link of vehicle {port.sysid}")
+        peer = (host, port.peer) if port.peer is not None else None
+        self._ends[port.link is Link.GROUND][port.sysid] = end, peer
+        asyncio.get_running_loop().add_reader(end, self._receive, port.sysid, port.link, end)
 
     def _receive(self, sysid: int, link: Link, end: socket.socket) -> None:
         """Hand all waiting datagrams to the vehicle; an ICMP error of an absent peer is none of our business."""

@@ -117,3 +117,32 @@ def test_garbage_on_its_ports_does_no_harm(base, ground):
                 stranger.sendto(datagram, ("127.0.0.1", 14580 + base))
         ground.send(mavlink.MAVLink_command_long_message(1, 1, 401, 0, *[0] * 7))
         assert ground.until(lambda: ground.last("COMMAND_ACK")).result == 0
+
+
+def test_a_companions_port_that_is_taken_by_the_simulator_or_the_ground_gets_nothing(base):
+    """By the usual ports, that of vehicle 11 is the ground station's, that of vehicle 41 vehicle 1's own."""
+    with running_sitl("--vehicles", "41", base=base):
+        station = GroundStation(base)
+        try:
+            station.until(lambda: station.last("HEARTBEAT", 41))
+            time.sleep(1.0)
+            assert not station.of("HIGHRES_IMU"), "only onboard links get this"
+        finally:
+            station.close()
+
+
+def test_the_onboard_links_can_be_moved(base):
+    own, peer = 4000 + base % 500, 5000 + base % 500
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as companion:
+        companion.bind(("127.0.0.1", peer + base + 1))
+        companion.settimeout(10.0)
+        with running_sitl("--vehicles", "2", "--onboard-ports", f"{own}:{peer}", base=base):
+            _, sender = companion.recvfrom(2048)
+    assert sender[1] == own + base + 1
+
+
+@pytest.mark.parametrize("ports", ["17000", "a:b", "80:81", "17000:70000"])
+def test_onboard_ports_that_are_none_are_refused(ports):
+    done = subprocess.run([str(SITL), "--onboard-ports", ports, "--vehicles", "1"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "expected two ports from 1024" in " ".join(done.stderr.replace("│", " ").split())

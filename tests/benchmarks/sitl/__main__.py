@@ -1,0 +1,123 @@
+"""The command line of the simulator's benchmark; see the package."""
+
+import argparse
+import os
+import platform
+import statistics
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from sitl.simulator import Simulator
+from tests.benchmarks.planner.figures import Figure, Results, Table, number
+from tests.benchmarks.sitl.fleet_process import FleetRun, Window, running_fleet
+from tests.benchmarks.sitl.in_process import boot_s, speeds_in_flight
+
+FLEET = 100
+WINDOWS = 5
+MOST_CPU_S, MOST_MB, SLOWEST, LONGEST_BOOT_S = 0.01, 2.0, 50.0, 1.0
+REAL_TIME = 0.98
+FEWEST_MESSAGES_HZ = 240.0
+"""Per vehicle, both links: the default streams are 250 a second."""
+
+
+def main() -> int:
+    """0 if every required figure is met, 1 if not."""
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.sitl", description=__doc__)
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables there, too")
+    given = parser.parse_args()
+    results = Results(Console(width=None if sys.stdout.isatty() else 160))
+    results.console.print(f"{_machine()}, load {os.getloadavg()[0]:.1f} at the start", highlight=False)
+    Simulator(1, seed=1).step()
+    results.add(*_one_vehicle())
+    alone_mb = _alone_mb()
+    with running_fleet(FLEET) as fleet:
+        results.add(*_fleet(fleet, alone_mb))
+    if given.markdown is not None:
+        given.markdown.write_text(results.markdown())
+    met = len(results.figures) - len(results.missed)
+    results.console.print(f"{met} of {len(results.figures)} required figures met", style="bold", highlight=False)
+    return 1 if results.missed else 0
+
+
+def _one_vehicle() -> tuple[Table, list[Figure]]:
+    boot, speeds = boot_s(), list(speeds_in_flight())
+    rows = [
+        ("boot until it may arm, simulated s", number(boot), ""),
+        (
+            "hovering, simulated s per CPU s",
+            number(statistics.median(speeds)),
+            f"{min(speeds):.0f} to {max(speeds):.0f}",
+        ),
+    ]
+    figures = [
+        Figure("boot until a vehicle may arm", boot, LONGEST_BOOT_S),
+        Figure("one vehicle in process", statistics.median(speeds), SLOWEST, at_least=True, unit="times real time"),
+    ]
+    return Table("one vehicle in process", ("", "median", "range"), rows), figures
+
+
+def _alone_mb() -> float:
+    """Resident memory of the program with one vehicle."""
+    with running_fleet(1) as single:
+        return single.resident_mb
+
+
+def _fleet(fleet: FleetRun, alone_mb: float) -> tuple[Table, list[Figure]]:
+    standing = [fleet.measure() for _ in range(WINDOWS)]
+    fleet.take_off(FLEET)
+    flying = [fleet.measure() for _ in range(WINDOWS)]
+    resident_mb = fleet.resident_mb
+    added_mb = (resident_mb - alone_mb) / (FLEET - 1)
+    rows = [_row("standing", standing), _row("hovering", flying)]
+    title = (
+        f"{FLEET} vehicles, one process on one core, all telemetry received; ready {fleet.ready_after_s:.1f} s after "
+        f"its start; {resident_mb:.0f} MB, {alone_mb:.0f} MB with one vehicle"
+    )
+    header = ("", "CPU s per simulated s and vehicle", "range", "simulated s per s", "messages per s and vehicle")
+    return Table(title, header, rows), [
+        Figure("CPU per simulated second and vehicle, hovering", _cpu(flying), MOST_CPU_S),
+        Figure("CPU per simulated second and vehicle, standing", _cpu(standing), MOST_CPU_S),
+        Figure(
+            "pace on one core, hovering, best stretch", _pace(flying), REAL_TIME, at_least=True, unit="of real time"
+        ),
+        Figure("telemetry per vehicle, hovering", _messages_hz(flying), FEWEST_MESSAGES_HZ, at_least=True, unit="Hz"),
+        Figure("memory per vehicle, all of the process", resident_mb / FLEET, MOST_MB, unit="MB"),
+        Figure("memory per further vehicle", added_mb, MOST_MB, unit="MB"),
+    ]
+
+
+def _row(name: str, windows: list[Window]) -> tuple[str, ...]:
+    costs = [_cost(window) for window in windows]
+    spread = f"{min(costs):.4f} to {max(costs):.4f}"
+    return name, number(_cpu(windows)), spread, f"{_pace(windows):.3f}", number(_messages_hz(windows))
+
+
+def _cost(window: Window) -> float:
+    """CPU seconds per simulated second and vehicle."""
+    return window.cpu_s / window.simulated_s / FLEET
+
+
+def _cpu(windows: list[Window]) -> float:
+    return statistics.median(_cost(window) for window in windows)
+
+
+def _pace(windows: list[Window]) -> float:
+    """Of the best stretch: other programs on the machine can only slow it down."""
+    return max(window.simulated_s / window.wall_s for window in windows)
+
+
+def _messages_hz(windows: list[Window]) -> float:
+    return sum(window.messages for window in windows) / sum(window.simulated_s for window in windows) / FLEET
+
+
+def _machine() -> str:
+    models = [
+        line.split(":")[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines() if "model name" in line
+    ]
+    return f"Python {platform.python_version()}, {os.cpu_count()} cores, {models[0] if models else platform.machine()}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
