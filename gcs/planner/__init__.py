@@ -17,12 +17,14 @@ Layers, each importing only what stands below it:
 
 from gcs.planner.plan import FleetPlan, Limit, Progress, VehiclePlan, Violation
 from gcs.planner.planner import ALGORITHMS, compile_kernels, plan_mission
+from gcs.planner.search import SearchSettings
 
 __all__ = [
     "ALGORITHMS",
     "FleetPlan",
     "Limit",
     "Progress",
+    "SearchSettings",
     "VehiclePlan",
     "Violation",
     "compile_kernels",

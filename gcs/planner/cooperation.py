@@ -26,16 +26,19 @@ class Cooperation:
         problem: what is planned.
         settings: of every swarm.
         rng: all randomness; every swarm gets a generator spawned from it.
+        bent: first and fresh particles are bows; else there are the straight line and uniformly random ones.
     """
 
-    def __init__(self, problem: Problem, settings: EcpsoSettings, rng: np.random.Generator) -> None:
-        self.problem, self._settings, self._rng = problem, settings, rng
+    def __init__(self, problem: Problem, settings: EcpsoSettings, rng: np.random.Generator, bent: bool = True) -> None:
+        self.problem, self._settings, self._rng, self._bent = problem, settings, rng, bent
         n_vehicles, n_control = problem.base_m.shape[:2]
         self.offsets = np.zeros((n_vehicles, 2 * (n_control - 2)))
         self.curve_evaluations = 0
-        self._first = bows(n_control)
+        self._first = bows(n_control) if bent else np.zeros((1, self.offsets.shape[1]))
 
         def fresh(generator: np.random.Generator, count: int) -> Array:
+            if not bent:
+                return generator.uniform(-1.0, 1.0, (count, self.offsets.shape[1]))
             return fresh_bows(generator, count, n_control)
 
         self._swarms = [Ecpso(self._first, fresh, settings, generator) for generator in rng.spawn(n_vehicles)]
@@ -96,7 +99,7 @@ class Cooperation:
 
     def again(self, problem: Problem) -> "Cooperation":
         """New swarms for other variables; what was spent so far still counts."""
-        afresh = Cooperation(problem, self._settings, self._rng)
+        afresh = Cooperation(problem, self._settings, self._rng, self._bent)
         afresh.curve_evaluations = self.curve_evaluations
         return afresh
 

@@ -9,7 +9,7 @@ from gcs.planner.assembly import vehicle_plans
 from gcs.planner.baselines import BASELINES, BaselineSearch
 from gcs.planner.budget import new_budget
 from gcs.planner.plan import FleetPlan, Progress
-from gcs.planner.search import FleetSearch
+from gcs.planner.search import EVERYTHING, FleetSearch, SearchSettings
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
 
@@ -27,6 +27,7 @@ def plan_mission(
     clock: Callable[[], float] = time.perf_counter,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
+    settings: SearchSettings = EVERYTHING,
 ) -> FleetPlan:
     """Allocate targets and plan curves and track points for all vehicles of a mission, in its world as it is known.
 
@@ -41,6 +42,7 @@ def plan_mission(
         clock: monotonic seconds.
         on_progress: called after every round of the search.
         should_stop: asked often; True ends the search with the best plan so far.
+        settings: of `ecpso`, to switch parts of it off.
 
     Raises:
         UsageError: there is no such algorithm.
@@ -55,7 +57,7 @@ def plan_mission(
     if algorithm in BASELINES:
         search = BaselineSearch(mission, routes, seed, budget, listener, algorithm)
     else:
-        search = FleetSearch(mission, routes, seed, budget, listener)
+        search = FleetSearch(mission, routes, seed, budget, listener, settings)
     found = search.run()
     return FleetPlan(
         mission=mission.name,

@@ -6,7 +6,7 @@ the samples that the search looks at, it looks closer from then on and keeps far
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +61,31 @@ MOST_RAISES = 3
 
 
 @dataclass(frozen=True)
+class SearchSettings:
+    """The parts of the search; each can be switched off, to see what it is worth.
+
+    Args:
+        swarm: the parameters of every vehicle's E-CPSO, with switches for its adaptive mechanisms.
+        swarms: the swarms search between two polishes.
+        bows: first particles are bent to all sides; else there are the straight line and uniformly random ones.
+        lone_descents: the first plan is made of the best curve of each vehicle alone.
+        polish: what the swarms have found is improved along the gradient.
+        guide_paths: vehicles that cannot get through are guided along a path on the grid.
+    """
+
+    swarm: EcpsoSettings = field(default_factory=EcpsoSettings)
+    swarms: bool = True
+    bows: bool = True
+    lone_descents: bool = True
+    polish: bool = True
+    guide_paths: bool = True
+
+
+EVERYTHING = SearchSettings()
+"""The planner as it is meant to be used."""
+
+
+@dataclass(frozen=True)
 class Approved:
     """A plan without violations, and what it costs the search (eq. 13, and what slow flight costs)."""
 
@@ -77,18 +102,25 @@ class FleetSearch:
         seed: of all random numbers.
         budget: when to end.
         on_progress: called after every round.
+        settings: its parts.
     """
 
     def __init__(
-        self, mission: Mission, routes: list[Route], seed: int, budget: Budget, on_progress: Callable[[Progress], None]
+        self,
+        mission: Mission,
+        routes: list[Route],
+        seed: int,
+        budget: Budget,
+        on_progress: Callable[[Progress], None],
+        settings: SearchSettings = EVERYTHING,
     ) -> None:
         self._mission, self._routes, self._budget, self._on_progress = mission, routes, budget, on_progress
         self._care, self._raises, self._detours = Care(), 0, 0
         self._ways: list[Way | None] = [None] * len(routes)
         self._guides = guides(mission, routes)
-        self._settings = EcpsoSettings()
+        self._settings = settings
         self._problem = pose(mission, routes, self._guides, self._care)
-        self._swarms = Cooperation(self._problem, self._settings, np.random.default_rng(seed))
+        self._swarms = Cooperation(self._problem, settings.swarm, np.random.default_rng(seed), settings.bows)
         self._present: Refined | None = None
         self._best: Approved | None = None
         self._polishes = self._iterations = 0
@@ -104,11 +136,13 @@ class FleetSearch:
         self._begin(QUICK)
         self._report()
         while self._budget.share_done(self.evaluations) < 1.0 and not self._budget.interrupted():
+            window = self._settings.swarm.window
             if self._budget.left(self.evaluations) > self._swarms.curves_per_round / len(self._routes):
-                self._swarms.round()
-                self._iterations += self._settings.window
+                if self._settings.swarms:
+                    self._swarms.round()
+                self._iterations += window
             self._polish(THOROUGH)
-            if self._best is None and self._iterations % (PATIENCE * self._settings.window) == 0 and self._has_time():
+            if self._best is None and self._iterations % (PATIENCE * window) == 0 and self._has_time():
                 self._find_ways_around(self._swarms.violations_alone(self._swarms.offsets) > LOOKS_FEASIBLE)
             self._report()
         assert self._present is not None
@@ -119,11 +153,12 @@ class FleetSearch:
 
     def _begin(self, stages: tuple[Stage, ...]) -> None:
         """The first plan: every vehicle as if it were alone; where that fails, with an eye on the others."""
-        alone = self._swarms.fly_alone(LONE_EVALUATIONS, STUCK)
-        if self._detours == 0 and self._find_ways_around(alone > STUCK):
-            return
-        self._polish(stages)
-        self._insist()
+        if self._settings.lone_descents:
+            alone = self._swarms.fly_alone(LONE_EVALUATIONS, STUCK)
+            if self._detours == 0 and self._find_ways_around(alone > STUCK):
+                return
+            self._polish(stages)
+            self._insist()
         if self._best is None and not self._budget.interrupted():
             self._swarms.start()
             self._polish(stages)
@@ -155,7 +190,8 @@ class FleetSearch:
 
     def _refined(self, offsets: Array, stages: tuple[Stage, ...]) -> Refined:
         left = self._budget.left(self.evaluations)
-        refined = refine(self._problem, offsets, stages, left, self._budget.interrupted)
+        wanted = stages if self._settings.polish else ()
+        refined = refine(self._problem, offsets, wanted, left, self._budget.interrupted)
         self._polishes += refined.evaluations
         return refined
 
@@ -182,13 +218,15 @@ class FleetSearch:
         Returns:
             Whether there was anything to start afresh with.
         """
+        if not stuck.any() or not self._settings.guide_paths:
+            return False
         for index in np.flatnonzero(stuck):
             way = guide_way(self._mission, self._routes[index], WIDER**self._detours)
             if way is not None:
                 self._ways[index] = way
             elif self._detours == 0:  # as far as can be told, there is none: no use in being stubborn
                 self._budget = self._budget.settled(self.evaluations)
-        if not stuck.any() or not any(self._ways):
+        if not any(self._ways):
             return False
         ways = [way or route.straight for way, route in zip(self._ways, self._routes, strict=True)]
         n_control = control_points(self._mission, ways, POINTS_PER_CORNER * (1 + self._detours))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcs.errors import UsageError
-from gcs.planner import FleetPlan, Limit, Progress, feasibility, plan_mission
+from gcs.planner import FleetPlan, Limit, Progress, SearchSettings, feasibility, plan_mission
 from missions.mission import Mission, load_mission, shipped_missions
 from tests.unit.gcs.planner.worlds import forest, room, round_trip, wall
 
@@ -112,6 +112,24 @@ def test_it_stops_when_asked_to_with_the_best_so_far():
     plan = plan_mission(load_mission("indoor"), on_progress=told.append, should_stop=lambda: bool(told))
     assert plan.feasible
     assert plan.evaluations < 300
+
+
+PARTS = [field.name for field in dataclasses.fields(SearchSettings) if field.name != "swarm"]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_every_part_of_the_search_can_be_switched_off_and_changes_what_is_found(part: str):
+    mission = room(wall(10.0, (2.0, 4.0)), pads_m=((1.0, 9.0, 0.0), (1.0, 12.0, 0.0)))
+    whole = plan_mission(mission, evaluations=800)
+    without = plan_mission(mission, evaluations=800, settings=dataclasses.replace(SearchSettings(), **{part: False}))
+    assert whole.feasible
+    assert curves_of(whole) != curves_of(without)
+
+
+def test_only_the_swarms_are_left_without_descents_and_these_find_the_way_as_well():
+    swarms_alone = SearchSettings(lone_descents=False, polish=False)
+    plan = plan_mission(load_mission("indoor"), evaluations=2500, settings=swarms_alone)
+    assert plan.feasible
 
 
 def test_an_unknown_algorithm_is_refused_with_the_choices():
