@@ -2,6 +2,8 @@
 
 import argparse
 import os
+import platform
+import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -35,12 +37,14 @@ def main() -> int:
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables there, too")
     given = parser.parse_args()
     results = Results(Console(width=None if sys.stdout.isatty() else 160))
+    results.note(_machine())
     results.console.print("compiling, warming up")
     _warm_up()
     scope = quick(given.seeds) if given.quick else Scope(given.seeds)
     for name in given.only or PARTS:
         for table, figures in PARTS[name](scope):
             results.add(table, figures)
+    results.note(f"load average at the end {os.getloadavg()[0]:.1f}")
     if given.markdown is not None:
         given.markdown.write_text(results.markdown())
     met = len(results.figures) - len(results.missed)
@@ -61,6 +65,13 @@ def _seeds(text: str) -> range:
     if not (separator and first.isdecimal() and end.isdecimal() and int(first) < int(end)):
         raise argparse.ArgumentTypeError(f"expected A:B with A < B, found {text!r}")
     return range(int(first), int(end))
+
+
+def _machine() -> str:
+    """What the times were measured on; with more load than cores, CPU times are longer than they should be."""
+    match = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
+    model = match[1] if match else platform.processor()
+    return f"{model}, {os.cpu_count()} cores, load average {os.getloadavg()[0]:.1f}, Python {platform.python_version()}"
 
 
 def _warm_up() -> None:

@@ -61,6 +61,12 @@ class Results:
     console: Console
     tables: list[Table] = field(default_factory=list)
     figures: list[Figure] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def note(self, text: str) -> None:
+        """Keep and print a sentence."""
+        self.notes.append(text)
+        self.console.print(text, highlight=False)
 
     def add(self, table: Table, figures: Sequence[Figure]) -> None:
         """Keep and print one part of the benchmark."""
@@ -78,7 +84,8 @@ class Results:
     def markdown(self) -> str:
         """All tables, and the verdict on every figure."""
         verdicts = [f"* {'met' if figure.met else '**missed**'}: {figure}" for figure in self.figures]
-        return "\n".join([table.markdown() for table in self.tables] + ["### Required figures", "", *verdicts]) + "\n"
+        tables = [table.markdown() for table in self.tables]
+        return "\n".join([*self.notes, "", *tables, "### Required figures", "", *verdicts]) + "\n"
 
 
 def expected_time_s(times_s: Sequence[float], reached: Sequence[bool]) -> float:

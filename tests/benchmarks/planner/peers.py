@@ -158,6 +158,11 @@ PEERS: dict[str, Peer] = {
 }
 """By the name under which they are reported."""
 
+ON_OUR_GRADIENTS = ("scipy SLSQP", "scipy L-BFGS-B", "scipy L-BFGS-B, straight")
+"""These live on the product's hand-made derivatives ..."""
+OURS_BUT_FOR_THE_DESCENT = ("scipy L-BFGS-B, straight",)
+"""... and this one on its first plan and stages, too: it is shown, and no peer that the product has to be ahead of."""
+
 
 def run_peer(name: str, task: Task, seed: int, limits: Limits, spent_s: float = 0.0) -> Attempt:
     """One attempt of one peer, until its limits end it."""

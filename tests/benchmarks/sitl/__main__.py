@@ -11,7 +11,7 @@ from rich.console import Console
 
 from sitl.simulator import Simulator
 from tests.benchmarks.planner.figures import Figure, Results, Table, number
-from tests.benchmarks.sitl.fleet_process import FleetRun, Window, running_fleet
+from tests.benchmarks.sitl.fleet_process import FleetRun, Memory, Window, running_fleet
 from tests.benchmarks.sitl.in_process import boot_s, speeds_in_flight
 
 FLEET = 100
@@ -31,9 +31,10 @@ def main() -> int:
     results.console.print(f"{_machine()}, load {os.getloadavg()[0]:.1f} at the start", highlight=False)
     Simulator(1, seed=1).step()
     results.add(*_one_vehicle())
-    alone_mb = _alone_mb()
+    with running_fleet(1) as single:
+        alone = single.memory
     with running_fleet(FLEET) as fleet:
-        results.add(*_fleet(fleet, alone_mb))
+        results.add(*_fleet(fleet, alone))
     if given.markdown is not None:
         given.markdown.write_text(results.markdown())
     met = len(results.figures) - len(results.missed)
@@ -58,33 +59,32 @@ def _one_vehicle() -> tuple[Table, list[Figure]]:
     return Table("one vehicle in process", ("", "median", "range"), rows), figures
 
 
-def _alone_mb() -> float:
-    """Resident memory of the program with one vehicle."""
-    with running_fleet(1) as single:
-        return single.resident_mb
-
-
-def _fleet(fleet: FleetRun, alone_mb: float) -> tuple[Table, list[Figure]]:
+def _fleet(fleet: FleetRun, alone: Memory) -> tuple[Table, list[Figure]]:
     standing = [fleet.measure() for _ in range(WINDOWS)]
     fleet.take_off(FLEET)
     flying = [fleet.measure() for _ in range(WINDOWS)]
-    resident_mb = fleet.resident_mb
-    added_mb = (resident_mb - alone_mb) / (FLEET - 1)
+    memory = fleet.memory
+    further_mb = (memory.resident_mb - alone.resident_mb) / (FLEET - 1)
     rows = [_row("standing", standing), _row("hovering", flying)]
     title = (
-        f"{FLEET} vehicles, one process on one core, all telemetry received; ready {fleet.ready_after_s:.1f} s after "
-        f"its start; {resident_mb:.0f} MB, {alone_mb:.0f} MB with one vehicle"
+        f"{FLEET} vehicles in one process, all telemetry received; ready {fleet.ready_after_s:.1f} s after its start; "
+        f"{memory.resident_mb:.0f} MB resident, {memory.own_mb:.0f} MB without the libraries' code; with one vehicle "
+        f"{alone.resident_mb:.0f} and {alone.own_mb:.0f} MB"
     )
     header = ("", "CPU s per simulated s and vehicle", "range", "simulated s per s", "messages per s and vehicle")
     return Table(title, header, rows), [
         Figure("CPU per simulated second and vehicle, hovering", _cpu(flying), MOST_CPU_S),
         Figure("CPU per simulated second and vehicle, standing", _cpu(standing), MOST_CPU_S),
         Figure(
-            "pace on one core, hovering, best stretch", _pace(flying), REAL_TIME, at_least=True, unit="of real time"
+            "pace of the one thread, hovering, best stretch",
+            _pace(flying),
+            REAL_TIME,
+            at_least=True,
+            unit="of real time",
         ),
         Figure("telemetry per vehicle, hovering", _messages_hz(flying), FEWEST_MESSAGES_HZ, at_least=True, unit="Hz"),
-        Figure("memory per vehicle, all of the process", resident_mb / FLEET, MOST_MB, unit="MB"),
-        Figure("memory per further vehicle", added_mb, MOST_MB, unit="MB"),
+        Figure("memory per vehicle, data of the whole process", memory.own_mb / FLEET, MOST_MB, unit="MB"),
+        Figure("memory per further vehicle, resident", further_mb, MOST_MB, unit="MB"),
     ]
 
 

@@ -39,6 +39,16 @@ class Window:
     """Received on both links of all vehicles."""
 
 
+@dataclass(frozen=True)
+class Memory:
+    """Of a process."""
+
+    resident_mb: float
+    """All of it, with the code of libraries, which other processes share and the kernel may drop."""
+    own_mb: float
+    """What no file holds: the process's data."""
+
+
 class Listener:
     """A ground station's and all companions' sockets, which take in everything and note how far each vehicle is."""
 
@@ -121,9 +131,11 @@ class FleetRun:
         self.ready_after_s = ready_after_s
 
     @property
-    def resident_mb(self) -> float:
-        pages = int(Path(f"/proc/{self._pid}/statm").read_text().split()[1])
-        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    def memory(self) -> Memory:
+        """What the process occupies now."""
+        rollup = Path(f"/proc/{self._pid}/smaps_rollup").read_text().splitlines()[1:]
+        kilobytes = {line.split(":")[0]: int(line.split()[1]) for line in rollup}
+        return Memory(resident_mb=kilobytes["Rss"] * 1024e-6, own_mb=kilobytes["Anonymous"] * 1024e-6)
 
     def measure(self) -> Window:
         """What the next seconds cost."""
@@ -157,7 +169,7 @@ class FleetRun:
 
 @contextmanager
 def running_fleet(n_vehicles: int) -> Iterator[FleetRun]:
-    """The program on one core, real time, on open ground; ended with the block.
+    """The program, which has one thread, at real time on open ground; ended with the block.
 
     Raises:
         RuntimeError: it does not start.
@@ -168,7 +180,6 @@ def running_fleet(n_vehicles: int) -> Iterator[FleetRun]:
     begun_s = time.monotonic()
     try:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-            os.sched_setaffinity(process.pid, {max(os.sched_getaffinity(0))})
             assert process.stdin is not None
             assert process.stdout is not None
             line = process.stdout.readline()
