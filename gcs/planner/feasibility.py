@@ -24,6 +24,8 @@ SPACING_M = {Site.INDOOR: 0.05, Site.OUTDOOR: 1.0}
 """Samples of a curve that is to be judged lie at most so far apart."""
 MEAN_STRIDE = 4
 """Means are taken over every so-manyth sample: distances between vehicles change slowly."""
+JOINING_SAMPLES = 200
+"""Of the ways from pads to curves: tens of metres, looked at every few decimetres."""
 COARSE_STRIDE = 16
 """Every so-manyth sample tells which vehicles never come near one another."""
 ROUNDING = 1e-9
@@ -65,6 +67,7 @@ def violations(mission: Mission, vehicles: Sequence[TimedCurve]) -> tuple[Violat
         found += _shape(mission, vehicle)
         found += _reach(mission, vehicle)
     if len(vehicles) > 1:
+        found += _joining(mission, vehicles, fleet)
         found += _mean_separations(mission, vehicles, fleet)
         found += _separations(mission, vehicles, fleet)
     return tuple(found)
@@ -146,6 +149,30 @@ def _reach(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
         yield Violation(vehicle.name, Limit.RANGE, "", length_m, mission.limits.range_m)
     if vehicle.times_s[-1] > mission.limits.endurance_s:
         yield Violation(vehicle.name, Limit.ENDURANCE, "", float(vehicle.times_s[-1]), mission.limits.endurance_s)
+
+
+def _joining(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) -> Iterator[Violation]:
+    """No contact on the way from where vehicles hover above their pads to curves that begin in one launch point.
+
+    All set out at T0 and fly straight to where they are to have joined their curves, at equal shares of the way.
+    """
+    if mission.launch_point_m is None:
+        return
+    places_m = np.array([_way_to_curve(mission, *each) for each in zip(vehicles, fleet.joined, strict=True)])
+    contact_m = 2.0 * mission.limits.body_radius_m
+    for i, vehicle in enumerate(vehicles):
+        nearest_m = lengths(places_m[i + 1 :] - places_m[i]).min(axis=1)
+        for j in np.flatnonzero(nearest_m < contact_m - ROUNDING).tolist():
+            where = f"on the way from its pad to its curve, to {vehicles[i + 1 + j].name}"
+            yield Violation(vehicle.name, Limit.SEPARATION, where, float(nearest_m[j]), contact_m)
+
+
+def _way_to_curve(mission: Mission, vehicle: TimedCurve, joined: BoolArray) -> Array:
+    """(`JOINING_SAMPLES`, 3) places from the hover above the pad to the first sample at which the curve is joined."""
+    pad_m = np.array(mission.vehicle(vehicle.sysid).pad_m)
+    hover_m = pad_m + np.array([0.0, 0.0, mission.takeoff_height_m])
+    at_m = vehicle.curve_m[int(np.argmax(joined))] if joined.any() else vehicle.curve_m[-1]
+    return hover_m + np.linspace(0.0, 1.0, JOINING_SAMPLES)[:, None] * (at_m - hover_m)
 
 
 def _mean_separations(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) -> Iterator[Violation]:

@@ -10,7 +10,7 @@ import pytest
 from gcs.planner import feasibility
 from gcs.planner.plan import Limit, TimedCurve, Violation
 from missions.mission import Mission, Target, load_mission
-from missions.world import Peak, Threat
+from missions.world import Peak, Point3, Threat
 from tests.unit.gcs.planner.worlds import room, wall
 
 SPEED_M_S = 2.0
@@ -197,6 +197,35 @@ def test_near_the_launch_point_separation_rests_but_contact_does_not():
 
     breach = found(mission, flown(mission, [together_at_first(1), together_at_first(-1)]))[Limit.SEPARATION]
     assert (breach.found, breach.required) == (pytest.approx(0.0), pytest.approx(0.4))
+
+
+def test_vehicles_that_change_sides_between_their_pads_and_their_curves_are_found():
+    terrain = load_mission("terrain-1-5uav")
+    near = msgspec.structs.replace(terrain.limits, mean_separation_m=(0.0, 1e6))
+    world = msgspec.structs.replace(terrain.world, peaks=(), threats=())
+    north, south = (200.0, 600.0, 100.0), (600.0, 200.0, 100.0)
+
+    def flown_from(pads_m: tuple[Point3, ...]) -> dict[Limit, Violation]:
+        mission = msgspec.structs.replace(
+            terrain,
+            world=world,
+            limits=near,
+            vehicles=tuple(
+                msgspec.structs.replace(vehicle, pad_m=pad_m)
+                for vehicle, pad_m in zip(terrain.vehicles[:2], pads_m, strict=True)
+            ),
+            targets=tuple(
+                msgspec.structs.replace(target, position_m=place)
+                for target, place in zip(terrain.targets[:2], (north, south), strict=True)
+            ),
+        )
+        return found(mission, flown(mission, [straight((0, 0, 0), north), straight((0, 0, 0), south)]))
+
+    pads_m = ((3.0, 6.0, 0.0), (6.0, 3.0, 0.0))
+    assert flown_from(pads_m) == {}
+    breach = flown_from(pads_m[::-1])[Limit.SEPARATION]
+    assert (breach.vehicle, breach.required) == ("alpha", pytest.approx(0.4))
+    assert breach.where == "on the way from its pad to its curve, to bravo"
 
 
 def test_samples_that_hide_something_between_them_are_refused():
