@@ -23,8 +23,6 @@ LISTENING_PAUSE_S = 0.02
 HEARTBEAT_INTERVAL_S = 1.0
 STARTING_S, CLIMBING_S, WINDOW_S = 2.0, 8.0, 4.0
 RECEIVE_BUFFER_BYTES = 1 << 22
-HEADER_BYTES = 10
-LOCAL_POSITION_NED = mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED
 NAN = float("nan")
 
 
@@ -61,7 +59,8 @@ class Listener:
             self._bind(COMPANION_PORT + i)
         self._heartbeat_due_s = 0.0
         self.messages = 0
-        self._time_s: dict[int, float] = {}
+        self.simulated_s = 0.0
+        """Vehicle time of the newest ATTITUDE of vehicle 1, 50 times a second on board; all have one clock."""
         self._height_m: dict[int, float] = {}
 
     def close(self) -> None:
@@ -70,14 +69,9 @@ class Listener:
         self._selector.close()
 
     @property
-    def simulated_s(self) -> float:
-        """Vehicle time of the newest position, mean of all vehicles; 0 until all have been heard."""
-        return sum(self._time_s.values()) / self._n if len(self._time_s) == self._n else 0.0
-
-    @property
     def lowest_m(self) -> float:
-        """Height of the lowest vehicle."""
-        return min(self._height_m.values(), default=0.0)
+        """Height of the lowest vehicle; 0 until all have been heard."""
+        return min(self._height_m.values()) if len(self._height_m) == self._n else 0.0
 
     def send(self, sysid: int, message: Message) -> None:
         port = GROUND_PORT + INSTANCE_BASE + sysid - 1
@@ -102,10 +96,14 @@ class Listener:
             except BlockingIOError:
                 return
             self.messages += 1
-            if end is self._ground and frame[7] == LOCAL_POSITION_NED and frame[8] == frame[9] == 0:
-                position: Any = self._codec.decode(bytearray(frame))
-                self._time_s[frame[5]] = position.time_boot_ms * 1e-3
-                self._height_m[frame[5]] = -position.z
+            kind, sysid = int.from_bytes(frame[7:10], "little"), frame[5]
+            if kind == mavlink.MAVLINK_MSG_ID_ATTITUDE and sysid == 1:
+                self.simulated_s = self._decoded(frame).time_boot_ms * 1e-3
+            elif kind == mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED and end is self._ground:
+                self._height_m[sysid] = -self._decoded(frame).z
+
+    def _decoded(self, frame: bytes) -> Any:
+        return self._codec.decode(bytearray(frame))
 
     def _bind(self, port: int) -> socket.socket:
         end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
