@@ -12,6 +12,7 @@ import numpy as np
 
 from missions import obstacles
 from missions.errors import ConfigError, MissionError
+from missions.faults import LinkConditions, SimulatorFault
 from missions.frames import GeodeticPoint, LocalFrame
 from missions.world import Name, NotNegative, Point3, Positive, World
 from missions.yaml_source import load_struct
@@ -162,12 +163,9 @@ class Blackout(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     duration_s: Positive
 
 
-class LinkSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The simulated ground link."""
+class LinkSettings(LinkConditions, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One kind of link in the simulator."""
 
-    loss: Share = 0.0
-    delay_s: NotNegative = 0.0
-    jitter_s: NotNegative = 0.0
     blackouts: tuple[Blackout, ...] = ()
 
 
@@ -176,8 +174,10 @@ class Simulation(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
     positioning: Positioning = Positioning()
     ground_link: LinkSettings = LinkSettings()
+    onboard_link: LinkSettings = LinkSettings()
     wind_enu_m_s: Point3 = (0.0, 0.0, 0.0)
     gust_std_m_s: NotNegative = 0.0
+    faults: tuple[SimulatorFault, ...] = ()
 
 
 class Mission(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

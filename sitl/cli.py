@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from missions.errors import MissionError
+from missions.faults import SIMULATOR_EXAMPLES, parse_simulator_fault
 from missions.frames import GeodeticPoint
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
@@ -46,27 +47,33 @@ def fly(
     onboard_ports: Annotated[
         str, typer.Option(metavar="OWN:PEER", help="First ports of the onboard links and of the companions.")
     ] = f"{ONBOARD_PORT}:{COMPANION_PORT}",
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SPEC", help=f"What goes wrong, e.g. {SIMULATOR_EXAMPLES[1]}; repeatable."),
+    ] = None,
     supervised: Annotated[bool, typer.Option("--supervised", help="End when standard input does.")] = False,
 ) -> None:
     """Simulate the vehicles of a mission, each an autopilot with PX4's manners on two UDP ports.
 
     Vehicle i talks to the ground station on UDP 14550 from port 18570+(i-1), and to its companion on
-    14540+(i-1) from 14580+(i-1); --onboard-ports moves these. Ctrl-C ends it.
+    14540+(i-1) from 14580+(i-1); --onboard-ports moves these. Faults can also be ordered while it runs, on
+    UDP 14990 as lines of JSON (docs/simulator.md). Ctrl-C ends it.
     """
     if (mission is None) == (vehicles is None):
         raise typer.BadParameter("expected a MISSION or --vehicles, one of the two")
     onboard_port, companion_port = _ports(onboard_ports)
-    settings = Settings(
-        speed=speed,
-        seed=seed,
-        truth=truth,
-        instance_base=instance_base,
-        airframe=airframe,
-        onboard_port=onboard_port,
-        companion_port=companion_port,
-        supervised=supervised,
-    )
     try:
+        settings = Settings(
+            speed=speed,
+            seed=seed,
+            truth=truth,
+            instance_base=instance_base,
+            airframe=airframe,
+            onboard_port=onboard_port,
+            companion_port=companion_port,
+            faults=tuple(parse_simulator_fault(text) for text in fault or ()),
+            supervised=supervised,
+        )
         flown = _mission(mission, vehicles, origin)
         simulator = warm_simulator(flown, settings)
         asyncio.run(serve(simulator, settings))
@@ -87,13 +94,16 @@ def warm_simulator(mission: Mission, settings: Settings) -> Simulator:
         rehearsal = Simulator(mission, seed=settings.seed, airframe=settings.airframe.airframe)
         rehearsal.step()
     now_us = time.time_ns() // 1000
-    return Simulator(
+    simulator = Simulator(
         mission,
         seed=settings.seed,
         speed=settings.speed,
         airframe=settings.airframe.airframe,
         utc_start_us=now_us,
     )
+    for fault in settings.faults:
+        simulator.order(fault)
+    return simulator
 
 
 def _mission(name: str | None, n_vehicles: int | None, origin: str | None) -> Mission:

@@ -1,5 +1,6 @@
 """A fleet's physics and control in one compiled call per tick: five steps of 4 ms, then what each autopilot sees."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from sitl.estimator import (
     Wandering,
     estimate_attitude,
     locate,
+    set_noise,
     start_estimators,
     wander,
     wandering,
@@ -40,6 +42,12 @@ TICK_S = STEP_S * STEPS_PER_TICK
 NO_MOVERS = np.zeros((0, 4))
 
 _MOTORS_OFF, _ATTITUDE, _RATES = (int(Guidance[name]) for name in ("MOTORS_OFF", "ATTITUDE", "RATES"))
+_SURVIVES_RESTART = (
+    *("position_m", "velocity_m_s", "attitude", "rates_rad_s", "specific_force_m_s2", "rotor", "rotor_health"),
+    *("gust_m_s", "grounded", "crash", "crash_other", "position_std_m", "velocity_std_m_s", "dead_reckoning"),
+)
+"""What of a vehicle's record is body and world, and not its autopilot's."""
+
 _FLIGHT, _NOT_TAKEN_OFF = int(TakeoffStage.FLIGHT), int(TakeoffStage.DISARMED)
 
 
@@ -62,12 +70,15 @@ class Fleet:
         self._movers = mission.world.movers
         self._body_radius_m = mission.limits.body_radius_m
         self._wind_ned_m_s = swap_enu_ned(np.array(simulation.wind_enu_m_s))
+        self._positioning, self._frame = simulation.positioning, mission.frame
         self._wandering = wandering(simulation.positioning, simulation.gust_std_m_s, TICK_S)
         self._origin = mission_origin(mission.origin)
         self._rows = new_rows(len(mission.vehicles))
         pads = np.array([vehicle.pad_m for vehicle in mission.vehicles], dtype=float)
         pads[:, 2] = np.maximum(pads[:, 2], obstacles.terrain_height(pads, self._terrain))
         self.vehicles["position_m"] = swap_enu_ned(pads)
+        noise = simulation.positioning
+        set_noise(self.vehicles, noise.horizontal_std_m, noise.vertical_std_m, noise.velocity_std_m_s)
         start_estimators(self.vehicles, mission.frame, simulation.positioning, rng)
 
     def advance(self, time_s: float) -> list[Snapshot]:
@@ -93,6 +104,36 @@ class Fleet:
         """What each autopilot sees, without moving anything."""
         view(self.vehicles, self._origin, self._rows)
         return [Snapshot._make(row) for row in self._rows.tolist()]
+
+    # ----------------------------------------------------------------- faults
+    def set_weather(self, wind_enu_m_s: Sequence[float], gust_std_m_s: float) -> None:
+        """Change the wind and how strongly it gusts, for all vehicles."""
+        self._wind_ned_m_s = swap_enu_ned(np.array(wind_enu_m_s, dtype=float))
+        self._wandering = self._wandering._replace(gust_std_m_s=gust_std_m_s)
+
+    def set_noise(self, index: int, *, horizontal_std_m: float, vertical_std_m: float, velocity_std_m_s: float) -> None:
+        """Change how far one vehicle's estimates wander."""
+        set_noise(self.vehicles[index : index + 1], horizontal_std_m, vertical_std_m, velocity_std_m_s)
+
+    def lose_positioning(self, index: int, *, lost: bool) -> None:
+        """Take one vehicle the source of its position, or give it back."""
+        self.vehicles["dead_reckoning"][index] = lost
+
+    def fail_rotor(self, index: int, rotor: int, health: float) -> None:
+        """Let a rotor (0 to 3) follow only a share of its signal: 0 is a failure, 1 is whole."""
+        self.vehicles["rotor_health"][index, rotor] = health
+
+    def stop_motors(self, index: int) -> None:
+        """One vehicle's autopilot is gone."""
+        self.vehicles["guidance"][index] = Guidance.MOTORS_OFF
+
+    def restart_autopilot(self, index: int) -> None:
+        """Control and estimator of one vehicle begin anew, the estimator with an origin where it sees itself now."""
+        body, fresh = self.vehicles[index : index + 1], new_fleet(1)
+        for name in _SURVIVES_RESTART:
+            fresh[name] = body[name]
+        body[:] = fresh
+        start_estimators(body, self._frame, self._positioning, self._rng)
 
     @property
     def positions_enu_m(self) -> Array:

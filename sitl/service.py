@@ -8,6 +8,7 @@ from collections.abc import Coroutine
 from typing import Any
 
 from sitl.errors import NoStandardInput
+from sitl.link.control_port import ControlPort
 from sitl.link.truth_log import TruthLog
 from sitl.link.udp import FleetLinks, run
 from sitl.settings import Settings
@@ -28,13 +29,15 @@ async def serve(simulator: Simulator, settings: Settings) -> None:
         loop.add_signal_handler(number, stop.set)
     if settings.supervised:
         await _watch_standard_input(stop)
-    links = FleetLinks(simulator, settings)
+    links, control = FleetLinks(simulator, settings), ControlPort(simulator, settings)
     with TruthLog(settings.truth) if settings.truth else contextlib.nullcontext() as log:
         links.open()
         try:
+            control.open()
             _say_ready(simulator, settings)
             await _until(stop, run(simulator, links, settings, log))
         finally:
+            control.close()
             links.close()
 
 

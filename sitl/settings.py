@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from missions.faults import SimulatorFault
 from sitl.dynamics.airframe import AirframeName
 
 GROUND_PORT, GCS_PORT = 18570, 14550
 ONBOARD_PORT, COMPANION_PORT = 14580, 14540
+CONTROL_PORT = 14990
+"""Where faults are ordered at run time."""
 HIGHEST_INSTANCE_BASE = 65535 - GROUND_PORT - 250
 HIGHEST_ONBOARD_PORT = GROUND_PORT - 250
 """As far as any instance base leaves room for 250 vehicles."""
@@ -28,6 +31,8 @@ class Settings:
     """Of the first vehicle's onboard link; the others' follow."""
     companion_port: int = COMPANION_PORT
     """Of the first vehicle's companion; the others' follow."""
+    faults: tuple[SimulatorFault, ...] = ()
+    """Beside those of the mission."""
     supervised: bool = False
     """End when standard input does."""
     host: str = "127.0.0.1"

@@ -1,25 +1,32 @@
-"""The whole fleet on a virtual clock: physics, autopilots, MAVLink, ground-link faults. No socket, no wall clock.
+"""The whole fleet on a virtual clock: physics, autopilots, MAVLink, faults. No socket, no wall clock.
 
 One seed is one flight, to the bit: everything random comes from generators that the seed makes, and time advances by
 fixed steps.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from missions.faults import SimulatorFault
 from missions.mission import Mission
+from sitl.autopilot.memory import Memory
 from sitl.dynamics.airframe import X500_LIKE, Airframe
 from sitl.dynamics.state import Crash
+from sitl.fault_injection import Breakable, FaultInjector
 from sitl.fleet import TICK_S, Fleet
-from sitl.link.ground_link import Direction, GroundLink
+from sitl.link.faulty_link import Direction, FaultyLink
 from sitl.microservices.outbox import Link
 from sitl.open_field import open_field
+from sitl.snapshot import Snapshot
 from sitl.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
+REBOOT_S = 1.0
+"""An autopilot that boots anew is silent and deaf for this long."""
 UTC_START_US = 1_767_225_600_000_000
 """2026-01-01 00:00 UTC: when simulations begin that are not told otherwise."""
 
@@ -66,6 +73,10 @@ class Simulator:
         speed: simulated seconds per wall-clock second, as far as the vehicles' timeouts must know.
         airframe: the body of every vehicle.
         utc_start_us: UTC at boot.
+        memories: system id -> what a vehicle has kept from earlier runs.
+
+    Raises:
+        MissionError: one of the mission's faults names a vehicle that is not there.
 
     Example:
         >>> from missions.mission import load_mission
@@ -83,36 +94,39 @@ class Simulator:
         speed: float = 1.0,
         airframe: Airframe = X500_LIKE,
         utc_start_us: int = UTC_START_US,
+        memories: Mapping[int, Memory] | None = None,
     ) -> None:
         mission = open_field(mission) if isinstance(mission, int) else mission
         self.mission = mission
+        self._speed, self._airframe, self._utc_start_us = speed, airframe, utc_start_us
+        n = len(mission.vehicles)
         physics_rng, *link_rngs = (
-            np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(1 + len(mission.vehicles))
+            np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(1 + 2 * n)
         )
         self._fleet = Fleet(mission, airframe, physics_rng)
         self._ticks = 0
         self._first_takeoff_s: float | None = None
         self._out: list[tuple[int, Link, bytes]] = []
         self.collisions: list[Collision] = []
-        self._known_crashes = {vehicle.sysid: float(Crash.NONE) for vehicle in mission.vehicles}
+        self._index = {vehicle.sysid: index for index, vehicle in enumerate(mission.vehicles)}
+        self._known_crashes = dict.fromkeys(self._index, float(Crash.NONE))
+        self._memories = {sysid: (memories or {}).get(sysid) or Memory() for sysid in self._index}
+        self._booted_s = dict.fromkeys(self._index, 0.0)
+        self._asleep_until_s: dict[int, float] = {}
+        """Vehicles whose autopilot is booting anew."""
         views = self._fleet.views()
-        self.vehicles = {
-            vehicle.sysid: Vehicle(
-                sysid=vehicle.sysid,
-                body=self._fleet.vehicles[index],
-                gains=self._fleet.gains[index],
-                airframe=airframe,
-                positioning=mission.simulation.positioning,
-                speed=speed,
-                utc_start_us=utc_start_us,
-                first_view=views[index],
-            )
-            for index, vehicle in enumerate(mission.vehicles)
+        self.vehicles = {sysid: self._boot(sysid, views[index]) for sysid, index in self._index.items()}
+        settings = mission.simulation.ground_link, mission.simulation.onboard_link
+        self._links = {
+            sysid: {
+                Link.GROUND: FaultyLink(settings[0], link_rngs[index]),
+                Link.ONBOARD: FaultyLink(settings[1], link_rngs[n + index]),
+            }
+            for sysid, index in self._index.items()
         }
-        self._ground = {
-            vehicle.sysid: GroundLink(mission.simulation.ground_link, rng)
-            for vehicle, rng in zip(mission.vehicles, link_rngs, strict=True)
-        }
+        self._faults = FaultInjector(self._fleet, {sysid: self._breakable(sysid) for sysid in self._index})
+        for fault in mission.simulation.faults:
+            self.order(fault)
 
     @property
     def time_s(self) -> float:
@@ -131,30 +145,40 @@ class Simulator:
             crashed=self._fleet.vehicles["crash"] != Crash.NONE,
         )
 
+    def order(self, fault: SimulatorFault) -> None:
+        """Let something go wrong, now or when the fault says.
+
+        Raises:
+            MissionError: there is no such vehicle.
+        """
+        self._faults.order(fault, self.time_s)
+
     def receive(self, sysid: int, link: Link, datagram: bytes) -> None:
         """A datagram for a vehicle has come in on one of its links."""
-        ground = self._ground[sysid]
-        if link is Link.ONBOARD or ground.is_perfect:
+        way_in = self._links[sysid][link]
+        if way_in.is_perfect(self.time_s):
             self._deliver(sysid, link, datagram)
+            self._collect(sysid)
         else:
-            ground.send(Direction.UP, datagram, self.time_s, self._since_takeoff_s)
+            way_in.send(Direction.UP, datagram, self.time_s, self._since_takeoff_s)
 
     def step(self) -> None:
         """Advance everything by one tick."""
-        start_s = self.time_s
-        snapshots = self._fleet.advance(start_s)
+        snapshots = self._fleet.advance(self.time_s)
         self._ticks += 1
         now_s = self.time_s
-        for (sysid, vehicle), snapshot in zip(self.vehicles.items(), snapshots, strict=True):
-            for datagram in self._ground[sysid].arrived(Direction.UP, now_s):
-                vehicle.receive(Link.GROUND, datagram)
-            vehicle.tick(snapshot, now_s, TICK_S)
+        self._faults.tick(now_s, self._since_takeoff_s)
+        for sysid, snapshot in zip(self.vehicles, snapshots, strict=True):
+            for link, way_in in self._links[sysid].items():
+                for datagram in way_in.arrived(Direction.UP, now_s):
+                    self._deliver(sysid, link, datagram)
             if self._first_takeoff_s is None and not snapshot.grounded:
                 self._first_takeoff_s = now_s
             if snapshot.crash != self._known_crashes[sysid]:
                 self._known_crashes[sysid] = snapshot.crash
                 self._note_collision(sysid)
-            self._collect(sysid, vehicle)
+            self._tick(sysid, snapshot)
+            self._collect(sysid)
 
     def transmissions(self) -> list[tuple[int, Link, bytes]]:
         """What the vehicles have sent since the last call: (system id, link, one frame), in order."""
@@ -165,28 +189,72 @@ class Simulator:
     def _since_takeoff_s(self) -> float | None:
         return None if self._first_takeoff_s is None else self.time_s - self._first_takeoff_s
 
-    def _deliver(self, sysid: int, link: Link, datagram: bytes) -> None:
-        vehicle = self.vehicles[sysid]
-        vehicle.receive(link, datagram)
-        self._collect(sysid, vehicle)
+    def _tick(self, sysid: int, snapshot: Snapshot) -> None:
+        """Let one autopilot have its turn, if it is not booting."""
+        if sysid in self._asleep_until_s:
+            self._wake(sysid)
+        else:
+            self.vehicles[sysid].tick(snapshot, self.time_s - self._booted_s[sysid], TICK_S)
 
-    def _collect(self, sysid: int, vehicle: Vehicle) -> None:
-        """Move what a vehicle has sent to the outside, through the faults of its ground link."""
-        ground = self._ground[sysid]
-        frames = vehicle.outbox.take()
-        if ground.is_perfect:
-            self._out.extend((sysid, link, frame) for link, frame in frames)
-            return
-        for link, frame in frames:
-            if link is Link.ONBOARD:
+    def _deliver(self, sysid: int, link: Link, datagram: bytes) -> None:
+        if sysid not in self._asleep_until_s:
+            self.vehicles[sysid].receive(link, datagram)
+
+    def _collect(self, sysid: int) -> None:
+        """Move what a vehicle has sent to the outside, through the faults of its links."""
+        now_s, links, vehicle = self.time_s, self._links[sysid], self.vehicles[sysid]
+        perfect = {link: way_out.is_perfect(now_s) for link, way_out in links.items()}
+        for link, frame in vehicle.outbox.take():
+            if perfect[link]:
                 self._out.append((sysid, link, frame))
             else:
-                ground.send(Direction.DOWN, frame, self.time_s, self._since_takeoff_s)
-        arrived = ground.arrived(Direction.DOWN, self.time_s)
-        self._out.extend((sysid, Link.GROUND, frame) for frame in arrived)
+                links[link].send(Direction.DOWN, frame, now_s, self._since_takeoff_s)
+        for link, way_out in links.items():
+            if not perfect[link]:
+                self._out.extend((sysid, link, frame) for frame in way_out.arrived(Direction.DOWN, now_s))
+        if vehicle.autopilot.reboot_ordered and sysid not in self._asleep_until_s:
+            self._reboot(sysid)
 
+    # ------------------------------------------------------------------- boot
+    def _boot(self, sysid: int, view: Snapshot) -> Vehicle:
+        index = self._index[sysid]
+        return Vehicle(
+            sysid=sysid,
+            body=self._fleet.vehicles[index],
+            gains=self._fleet.gains[index],
+            airframe=self._airframe,
+            positioning=self.mission.simulation.positioning,
+            speed=self._speed,
+            utc_start_us=self._utc_start_us + round(self.time_s * 1e6),
+            first_view=view,
+            memory=self._memories[sysid],
+        )
+
+    def _reboot(self, sysid: int) -> None:
+        """Stop one autopilot, and its motors with it; it comes back after a while."""
+        self._fleet.stop_motors(self._index[sysid])
+        self._asleep_until_s[sysid] = self.time_s + REBOOT_S
+
+    def _wake(self, sysid: int) -> None:
+        if self.time_s < self._asleep_until_s[sysid]:
+            return
+        del self._asleep_until_s[sysid]
+        index = self._index[sysid]
+        self._fleet.restart_autopilot(index)
+        self._booted_s[sysid] = self.time_s
+        self.vehicles[sysid] = self._boot(sysid, self._fleet.views()[index])
+
+    def _breakable(self, sysid: int) -> Breakable:
+        return Breakable(
+            index=self._index[sysid],
+            links=self._links[sysid],
+            charge=self._memories[sysid].charge,
+            reboot=lambda: self._reboot(sysid),
+        )
+
+    # ------------------------------------------------------------- collisions
     def _note_collision(self, sysid: int) -> None:
-        index = tuple(self.vehicles).index(sysid)
+        index = self._index[sysid]
         body = self._fleet.vehicles[index]
         east, north, up = self._fleet.positions_enu_m[index].tolist()
         what = Crash(int(body["crash"]))

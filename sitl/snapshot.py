@@ -72,6 +72,8 @@ class Snapshot(NamedTuple):
     """The truth about standing on something."""
     height_m: float
     """Above home."""
+    dead_reckoning: float
+    """Nothing tells where the vehicle is."""
 
     @property
     def ground_speed_m_s(self) -> float:
@@ -115,6 +117,7 @@ def observe(v: Any, row: Any) -> None:
     row[45], row[46], row[47] = v.takeoff_stage, v.landed, v.ground_contact
     row[48], row[49] = v.crash, v.grounded
     row[50] = v.ground_z_m - row[2]
+    row[51] = v.dead_reckoning
 
 
 def new_rows(n_vehicles: int) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 from missions.mission import Positioning
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.flight_control import FlightControl
+from sitl.autopilot.memory import Memory
 from sitl.autopilot.parameter_table import parameter_table
 from sitl.autopilot.places import GlobalPoint, OwnFrame
 from sitl.autopilot.reports import Severity
@@ -15,6 +16,7 @@ from sitl.dynamics.airframe import Airframe
 from sitl.fleet import TICK_S
 from sitl.microservices.clock import ClockServer
 from sitl.microservices.command_server import CommandServer
+from sitl.microservices.commands import HANDLERS
 from sitl.microservices.mission_progress import MissionProgress
 from sitl.microservices.mission_transfer_server import MissionTransferServer, PlanStore
 from sitl.microservices.outbox import Link, Outbox, Sender
@@ -43,6 +45,7 @@ class Vehicle:
         speed: simulated seconds per wall-clock second.
         utc_start_us: UTC at boot.
         first_view: what the autopilot sees before the first tick.
+        memory: what it has kept from before this boot.
     """
 
     def __init__(
@@ -56,6 +59,7 @@ class Vehicle:
         speed: float,
         utc_start_us: int,
         first_view: Snapshot,
+        memory: Memory,
     ) -> None:
         self.sysid = sysid
         self._utc_start_us = utc_start_us
@@ -70,6 +74,7 @@ class Vehicle:
             speed,
             self._texts.say,
             self._progress.reached,
+            memory,
         )
         self._now_s = 0.0
         self._snapshot = first_view
@@ -79,6 +84,7 @@ class Vehicle:
         self._streams = {link: Streams(link, self.outbox, TICK_S) for link in Link}
         self._make_services(speed)
         self.autopilot.tick(first_view, 0.0, 0.0)
+        self.autopilot.remember()
 
     def _make_services(self, speed: float) -> None:
         autopilot, outbox, say = self.autopilot, self.outbox, self._texts.say
@@ -86,7 +92,7 @@ class Vehicle:
         self._parameters = ParameterServer(autopilot.parameters, outbox)
         store = PlanStore(autopilot)
         self._transfers = {link: MissionTransferServer(link, store, autopilot, outbox, say, speed) for link in Link}
-        self._commands = CommandServer(autopilot, outbox, self._streams, self._moment, say, speed)
+        self._commands = CommandServer(autopilot, outbox, self._streams, self._moment, say, speed, HANDLERS)
         self._setpoints = SetpointServer(autopilot)
         self._clock = ClockServer(outbox)
         self._targeted = self._targeted_handlers()

@@ -5,15 +5,17 @@ from collections.abc import Callable
 from sitl.autopilot.battery import Battery
 from sitl.autopilot.commander import BatteryWarning, Commander, Situation
 from sitl.autopilot.craft import Craft
+from sitl.autopilot.failure_detector import FailureDetector
 from sitl.autopilot.flight_control import FlightControl
 from sitl.autopilot.geofence import Geofence
+from sitl.autopilot.memory import Memory
 from sitl.autopilot.modes import Mode
 from sitl.autopilot.navigator import Navigator
 from sitl.autopilot.offboard import Offboard
 from sitl.autopilot.parameter_table import Parameter
 from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.places import LocalPoint, OwnFrame
-from sitl.autopilot.plan import Plan
+from sitl.autopilot.plan import Plan, altitude_amsl_m, latitude_deg, longitude_deg
 from sitl.autopilot.reports import Result, Say, Severity
 from sitl.snapshot import Snapshot, is_broken
 
@@ -37,6 +39,7 @@ class Autopilot:
         speed: simulated seconds per wall-clock second; the loss timeouts grow with it.
         say: where texts for the pilot go.
         on_reached: called with the sequence number of every mission item that has been reached.
+        memory: what it has kept from before this boot, and keeps from now on.
     """
 
     def __init__(
@@ -47,18 +50,22 @@ class Autopilot:
         speed: float,
         say: Say,
         on_reached: Callable[[int], None],
+        memory: Memory,
     ) -> None:
-        self.parameters = Parameters(table, speed, control.set_gain)
+        self.parameters = Parameters(table, speed, control.set_gain, memory.parameters)
         self.craft = Craft(control, self.parameters, frame, say, home=LocalPoint(0.0, 0.0, 0.0))
-        self.battery = Battery(self.parameters)
+        self.battery = Battery(self.parameters, memory.charge)
         self.commander = Commander(self.parameters, say)
+        self.failure_detector = FailureDetector(self.parameters)
         self.offboard = Offboard(self.parameters, say)
         self.fence = Geofence(self.craft)
         self.navigator = Navigator(self.craft, self.offboard, self.fence, on_reached)
         self.rally = Plan()
+        self.reboot_ordered = False
         self.home_known = False
         self.gcs_lost = True
         """Kept up to date by whoever hears the ground station."""
+        self._memory = memory
         self._say = say
         self._snapshot: Snapshot | None = None
         self._now_s = 0.0
@@ -66,6 +73,8 @@ class Autopilot:
         self._fence_breached = False
         self._fence_inside = True
         self._next_fence_s = 0.0
+        self._battery_said = BatteryWarning.NONE
+        self._reckoned_s = 0.0
         self._was_landed = True
         self._was_armed = False
 
@@ -97,13 +106,16 @@ class Autopilot:
         s = self.snapshot
         return Situation(
             landed=bool(s.landed),
-            offboard_alive=self.offboard.is_alive(self._now_s),
+            offboard_alive=self.offboard.is_alive(self._now_s)
+            and (self.craft.position_valid or not self.offboard.needs_position),
             mission_ready=self.mission_ready,
             gcs_lost=self.gcs_lost,
             battery=self.battery.warning,
             fence_breached=self._fence_breached,
             crashed=is_broken(s),
             at_rest=bool(s.grounded),
+            position_valid=self.craft.position_valid,
+            attitude_failed=self.failure_detector.attitude_failed,
         )
 
     def refresh(self) -> Commander:
@@ -122,11 +134,13 @@ class Autopilot:
 
     def set_mission(self, plan: Plan) -> None:
         """Store a mission; whether it can be flown is found out at once, and said."""
+        self._memory.mission = plan
         self.navigator.set_mission(plan)
         self._check_mission()
 
     def set_fence(self, plan: Plan) -> None:
         """Store a fence; one that the vehicle is outside of is not enforced until it has been inside."""
+        self._memory.fence = plan
         self.fence.set_plan(plan)
         s = self.snapshot
         self._fence_inside = self.fence.zones_allow(LocalPoint(s.x_m, s.y_m, s.z_m))
@@ -135,7 +149,20 @@ class Autopilot:
         self._check_mission()
 
     def set_rally(self, plan: Plan) -> None:
-        self.rally = plan
+        self._memory.rally = self.rally = plan
+        craft = self.craft
+        self.craft.rally_points = tuple(
+            craft.frame.local(latitude_deg(i), longitude_deg(i), altitude_amsl_m(i, craft.home_altitude_m))
+            for i in plan.items
+        )
+
+    def remember(self) -> None:
+        """After boot: take up the plans that have been stored before it."""
+        if self._memory.fence.items:
+            self.set_fence(self._memory.fence)
+        if self._memory.mission.items:
+            self.set_mission(self._memory.mission)
+        self.set_rally(self._memory.rally)
 
     def set_home(self, point: LocalPoint | None = None) -> None:
         """Home is here, or at a point."""
@@ -148,6 +175,8 @@ class Autopilot:
         """Let the autopilot look at its vehicle and decide what the control does next."""
         self._snapshot, self._now_s = s, now_s
         self._drain(dt_s)
+        self._reckon(s, dt_s)
+        self.failure_detector.update(s, dt_s)
         if now_s >= self._next_fence_s:
             self._next_fence_s = now_s + FENCE_CHECK_S
             self._check_fence(s)
@@ -171,13 +200,18 @@ class Autopilot:
             if following is not None:
                 commander.mode_finished(commander.mode, following)
 
+    def _reckon(self, s: Snapshot, dt_s: float) -> None:
+        """Without a source of its position a vehicle knows for EKF2_NOAID_TOUT longer where it is."""
+        self._reckoned_s = self._reckoned_s + dt_s if s.dead_reckoning else 0.0
+        self.craft.position_valid = self._reckoned_s <= 1e-6 * self.parameters["EKF2_NOAID_TOUT"]
+
     def _drain(self, dt_s: float) -> None:
         """Let the battery run, and say how empty it has become."""
-        before = self.battery.warning
         self.battery.update(self.commander.armed, dt_s)
         warning = self.battery.warning
-        if warning.value > before.value:
+        if warning.value > self._battery_said.value:
             self._say(Severity.EMERGENCY, BATTERY_TEXTS[warning])
+        self._battery_said = warning
 
     def _announce_landing(self, landed: bool) -> None:
         landed = landed or not self.commander.armed
@@ -196,6 +230,8 @@ class Autopilot:
             self._say(Severity.CRITICAL, self._mission_problem)
 
     def _check_fence(self, s: Snapshot) -> None:
+        if not self.craft.position_valid:
+            return
         here = LocalPoint(s.x_m, s.y_m, s.z_m)
         allowed = self.fence.allows(here)
         self._fence_inside = self._fence_inside or self.fence.zones_allow(here)

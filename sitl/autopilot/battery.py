@@ -1,6 +1,7 @@
 """A battery as PX4's simulator has it: drains while armed, down to a floor, and is full again when disarmed."""
 
 from sitl.autopilot.commander import BatteryWarning
+from sitl.autopilot.memory import Charge
 from sitl.autopilot.parameters import Parameters
 
 FULL_V = 16.2
@@ -10,10 +11,14 @@ EMPTY_V = 14.4
 class Battery:
     """State of charge of one vehicle's pack."""
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: Parameters, charge: Charge) -> None:
         self._parameters = parameters
-        self.remaining = 1.0
+        self._charge = charge
+
+    @property
+    def remaining(self) -> float:
         """Share of the charge, [0, 1]."""
+        return self._charge.remaining
 
     @property
     def voltage_v(self) -> float:
@@ -30,7 +35,7 @@ class Battery:
     def update(self, armed: bool, dt_s: float) -> None:
         """Drain at 1 / SIM_BAT_DRAIN per second to SIM_BAT_MIN_PCT, or refill."""
         if not armed:
-            self.remaining = 1.0
+            self._charge.remaining = self._charge.most
             return
         floor = min(self._parameters["SIM_BAT_MIN_PCT"] / 100.0, self.remaining)
-        self.remaining = max(self.remaining - dt_s / self._parameters["SIM_BAT_DRAIN"], floor)
+        self._charge.remaining = max(self.remaining - dt_s / self._parameters["SIM_BAT_DRAIN"], floor)

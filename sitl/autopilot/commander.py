@@ -39,6 +39,8 @@ class Situation(NamedTuple):
     crashed: bool = False
     at_rest: bool = True
     """It stands on something."""
+    position_valid: bool = True
+    attitude_failed: bool = False
 
 
 class SystemStatus(Enum):
@@ -63,6 +65,7 @@ class Commander:
         self._mode_after_disarm = Mode.HOLD
         self._landed_since_s: float | None = None
         self._flown_since_arming = False
+        self._airborne_s = 0.0
         self._terminated_s: float | None = None
         self.intended = Mode.HOLD
         self.armed = False
@@ -74,7 +77,10 @@ class Commander:
         if self._terminated_s is not None:
             return Mode.TERMINATION
         action = self._failsafes.action
-        return self.intended if action <= Action.WARN else MODE_OF_ACTION.get(action, self.intended)
+        if action <= Action.WARN:
+            return self.intended
+        mode = MODE_OF_ACTION.get(action, self.intended)
+        return mode if self._situation.position_valid or not mode.value.needs_position else Mode.LAND
 
     @property
     def failsafe(self) -> Action:
@@ -177,7 +183,15 @@ class Commander:
         elif self._situation.landed:
             self._disarm_when_landed()
         else:
-            self._flown_since_arming, self._landed_since_s = True, None
+            self._fly_on()
+
+    def _fly_on(self) -> None:
+        """In the air: an attitude that fails right after take-off stops the motors."""
+        if not self._flown_since_arming:
+            self._airborne_s = self._now_s
+        self._flown_since_arming, self._landed_since_s = True, None
+        if self._situation.attitude_failed and self._now_s - self._airborne_s < self._parameters["COM_LKDOWN_TKO"]:
+            self.disarm("lockdown", forced=True)
 
     def _update_failsafes(self) -> None:
         s = self._situation
@@ -188,6 +202,8 @@ class Commander:
             Cause.BATTERY_CRITICAL: s.battery is BatteryWarning.CRITICAL,
             Cause.BATTERY_EMERGENCY: s.battery is BatteryWarning.EMERGENCY,
             Cause.GEOFENCE: s.fence_breached and not s.landed,
+            Cause.POSITION_LOST: not s.position_valid and self.intended.value.needs_position,
+            Cause.ATTITUDE_FAILED: s.attitude_failed and self.intended is not Mode.ACRO,
         }
         worse = self._failsafes.update(failing, self._now_s)
         if worse and self._failsafes.delayed > Action.NONE:
@@ -218,6 +234,8 @@ class Commander:
     def _may_run(self, mode: Mode, *, arming: bool = False) -> bool:
         """Whether what the mode needs is there."""
         if arming and not mode.value.allows_arming:
+            return False
+        if mode.value.needs_position and not self._situation.position_valid:
             return False
         if mode is Mode.OFFBOARD:
             return self._situation.offboard_alive

@@ -26,6 +26,11 @@ class Craft:
     home_set_s: float = 0.0
     speed_override_m_s: float | None = None
     """Cruise speed ordered by DO_CHANGE_SPEED."""
+    position_valid: bool = True
+    """Whether the vehicle knows where it is."""
+    rally_points: tuple[LocalPoint, ...] = ()
+    region_of_interest: LocalPoint | None = None
+    """Where auto modes turn the nose to."""
 
     @property
     def cruise_m_s(self) -> float:
@@ -48,6 +53,12 @@ class Craft:
     def set_home(self, point: LocalPoint, yaw_rad: float, now_s: float) -> None:
         self.home, self.home_yaw_rad, self.home_set_s = point, yaw_rad, now_s
         self.control.set_ground(point.z_m)
+
+    def look_at(self, point: LocalPoint | None) -> None:
+        """Turn the nose to a point in auto modes, or along the way again."""
+        if point is None and self.region_of_interest is not None:
+            self.control.turn_to(math.nan)
+        self.region_of_interest = point
 
     def stop_point(self, s: Snapshot) -> LocalPoint:
         """Where the vehicle comes to a stop if it brakes now."""

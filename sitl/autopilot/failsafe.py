@@ -21,6 +21,8 @@ class Cause(IntEnum):
     BATTERY_CRITICAL = 3
     BATTERY_EMERGENCY = 4
     GEOFENCE = 5
+    POSITION_LOST = 6
+    ATTITUDE_FAILED = 7
 
 
 class Action(IntEnum):
@@ -32,8 +34,10 @@ class Action(IntEnum):
     HOLD = 3
     RTL = 4
     LAND = 5
-    DISARM = 6
-    TERMINATE = 7
+    LAND_BLIND = 6
+    """Sink level; what is left to who does not know where it is."""
+    DISARM = 7
+    TERMINATE = 8
 
 
 MODE_OF_ACTION = {
@@ -41,6 +45,7 @@ MODE_OF_ACTION = {
     Action.HOLD: Mode.HOLD,
     Action.RTL: Mode.RTL,
     Action.LAND: Mode.LAND,
+    Action.LAND_BLIND: Mode.LAND,
     Action.TERMINATE: Mode.TERMINATION,
 }
 """The mode that is shown while an action is taken. Position has no sticks here, so it descends."""
@@ -153,6 +158,10 @@ class Failsafes:
                 return _OFFBOARD_LOSS.get(int(self._parameters["COM_OBL_RC_ACT"]), Action.DESCEND)
             case Cause.GCS_LOST:
                 return _GCS_LOSS.get(int(self._parameters["NAV_DLL_ACT"]), Action.NONE)
+            case Cause.POSITION_LOST:
+                return Action.LAND_BLIND
+            case Cause.ATTITUDE_FAILED:
+                return Action.TERMINATE if self._parameters["CBRK_FLIGHTTERM"] == 0 else Action.WARN
             case Cause.GEOFENCE:
                 return _GEOFENCE.get(int(self._parameters["GF_ACTION"]), Action.NONE)
         return self._battery_action(cause)

@@ -91,6 +91,10 @@ class FlightControl:
         """Change the horizontal speed of what is being flown."""
         self._vehicle["cruise_m_s"] = cruise_m_s
 
+    def turn_to(self, yaw_rad: float) -> None:
+        """Change the heading of what is being flown; NaN follows the trajectory."""
+        self._vehicle["target_yaw_rad"] = yaw_rad
+
     def land_at(self, x_m: float, y_m: float, *, cruise_m_s: float, yaw_rad: float = NAN) -> None:
         """Descend at a place until the land detector stops it."""
         self._enter_auto(Guidance.LAND)

@@ -114,19 +114,26 @@ class Hold:
 
 
 class Land:
-    """Descend where the vehicle comes to a stop."""
+    """Descend where the vehicle comes to a stop; level, and wherever it drifts, while it does not know where it is."""
 
     def __init__(self, craft: Craft) -> None:
         self._craft = craft
+        self._blind = False
 
     def start(self, s: Snapshot, now_s: float) -> None:
+        self._blind = not self._craft.position_valid
         if s.landed:
             self._craft.control.idle()
-            return
-        stop = self._craft.stop_point(s)
-        self._craft.control.land_at(stop.x_m, stop.y_m, cruise_m_s=self._craft.cruise_m_s)
+        elif self._blind:
+            speed_m_s = self._craft.parameters["MPC_LAND_SPEED"]
+            self._craft.control.track((NAN, NAN, NAN), (NAN, NAN, speed_m_s), (0.0, 0.0, NAN))
+        else:
+            stop = self._craft.stop_point(s)
+            self._craft.control.land_at(stop.x_m, stop.y_m, cruise_m_s=self._craft.cruise_m_s)
 
     def update(self, s: Snapshot, now_s: float) -> bool:
+        if self._blind is self._craft.position_valid:
+            self.start(s, now_s)
         return False
 
 
@@ -154,12 +161,13 @@ class _ReturnStage(Enum):
 
 
 class Return:
-    """Climb to a safe height, fly home, and land there."""
+    """Climb to a safe height, fly home or to the nearest rally point, and land there."""
 
     def __init__(self, craft: Craft) -> None:
         self._craft = craft
         self._stage = _ReturnStage.GROUND
-        self._target = craft.home
+        self._target = self._destination = craft.home
+        self._yaw_rad = NAN
         self._wait_until_s = math.inf
 
     def start(self, s: Snapshot, now_s: float) -> None:
@@ -167,10 +175,11 @@ class Return:
             self._stage = _ReturnStage.GROUND
             self._craft.control.idle()
             return
+        self._choose_destination(s)
         z_m = self._return_z_m(s)
-        above_home_m = round(self._craft.home.z_m - z_m)
+        above_m = round(self._destination.z_m - z_m)
         altitude_m = round(self._craft.frame.origin.altitude_m - z_m)
-        text = f"RTL: start return at {altitude_m} m ({above_home_m} m above destination)"
+        text = f"RTL: start return at {altitude_m} m ({above_m} m above destination)"
         self._craft.say(Severity.INFO, text)
         self._stage = _ReturnStage.CLIMB
         stop = self._craft.stop_point(s)
@@ -186,17 +195,25 @@ class Return:
             self._go_on(s, now_s)
         return False
 
+    def _choose_destination(self, s: Snapshot) -> None:
+        """RTL_TYPE 0: what is nearest of home and the rally points; 1: of the rally points, if there are any."""
+        craft = self._craft
+        without_home = craft.parameters["RTL_TYPE"] > 0 and craft.rally_points
+        places = craft.rally_points if without_home else (craft.home, *craft.rally_points)
+        self._destination = min(places, key=lambda place: distance_m(s, place))
+        self._yaw_rad = craft.home_yaw_rad if self._destination is craft.home else NAN
+
     def _go_on(self, s: Snapshot, now_s: float) -> None:
-        home, delay_s = self._craft.home, self._craft.parameters["RTL_LAND_DELAY"]
+        there, delay_s = self._destination, self._craft.parameters["RTL_LAND_DELAY"]
         if self._stage is _ReturnStage.CLIMB:
             self._stage = _ReturnStage.RETURN
-            near = distance_m(s, home) < self._craft.parameters["RTL_MIN_DIST"]
-            yaw_rad = self._craft.home_yaw_rad if near else NAN
-            self._fly(LocalPoint(home.x_m, home.y_m, self._target.z_m), yaw_rad)
+            near = distance_m(s, there) < self._craft.parameters["RTL_MIN_DIST"]
+            yaw_rad = self._yaw_rad if near else NAN
+            self._fly(LocalPoint(there.x_m, there.y_m, self._target.z_m), yaw_rad)
         elif self._stage is _ReturnStage.RETURN and delay_s != 0.0:
             self._stage = _ReturnStage.DESCEND
-            z_m = max(home.z_m - self._craft.parameters["RTL_DESCEND_ALT"], self._target.z_m)
-            self._fly(LocalPoint(home.x_m, home.y_m, z_m), self._craft.home_yaw_rad)
+            z_m = max(there.z_m - self._craft.parameters["RTL_DESCEND_ALT"], self._target.z_m)
+            self._fly(LocalPoint(there.x_m, there.y_m, z_m), self._yaw_rad)
         elif self._stage is _ReturnStage.DESCEND:
             self._stage = _ReturnStage.WAIT
             self._wait_until_s = now_s + delay_s if delay_s > 0.0 else math.inf
@@ -207,9 +224,9 @@ class Return:
 
     def _land(self) -> None:
         self._stage = _ReturnStage.LAND
-        craft = self._craft
+        craft, there = self._craft, self._destination
         craft.say(Severity.INFO, "RTL: land at destination")
-        craft.control.land_at(craft.home.x_m, craft.home.y_m, cruise_m_s=craft.cruise_m_s, yaw_rad=craft.home_yaw_rad)
+        craft.control.land_at(there.x_m, there.y_m, cruise_m_s=craft.cruise_m_s, yaw_rad=self._yaw_rad)
 
     def _fly(self, target: LocalPoint, yaw_rad: float) -> None:
         self._target = target
@@ -221,9 +238,9 @@ class Return:
         )
 
     def _return_z_m(self, s: Snapshot) -> float:
-        """How high to fly home: RTL_RETURN_ALT, or on the cone above home when near; never down."""
-        p, home = self._craft.parameters, self._craft.home
-        away_m = distance_m(s, home)
+        """How high to fly there: RTL_RETURN_ALT, or on the cone above it when near; never down."""
+        p, there = self._craft.parameters, self._destination
+        away_m = distance_m(s, there)
         highest_m = p["RTL_RETURN_ALT"]
         if away_m <= p["NAV_ACC_RAD"]:
             height_m = 2.0 * away_m
@@ -232,4 +249,4 @@ class Return:
             height_m = max(min(away_m / math.tan(half_angle_rad), highest_m), 2.0 * p["NAV_ACC_RAD"])
         else:
             height_m = highest_m
-        return min(home.z_m - min(height_m, highest_m), s.z_m)
+        return min(there.z_m - min(height_m, highest_m), s.z_m)

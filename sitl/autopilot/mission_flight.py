@@ -161,6 +161,10 @@ class MissionFlight:
                 self._fly(item, s)
             case Cmd.DO_CHANGE_SPEED:
                 craft.change_speed(item.param2)
+            case Cmd.DO_SET_ROI_LOCATION | Cmd.DO_SET_ROI:
+                craft.look_at(self._place(item, s) if has_place(item) else None)
+            case Cmd.DO_SET_ROI_NONE:
+                craft.look_at(None)
             case Cmd.DO_SET_HOME:
                 place = self._place(item, s)
                 craft.set_home(LocalPoint(place.x_m, place.y_m, place.z_m), craft.home_yaw_rad, craft.home_set_s)

@@ -35,6 +35,8 @@ class ModeTraits:
     flies: bool = True
     """False: it needs a pilot's sticks, or equipment, which this autopilot does not have."""
     allows_arming: bool = True
+    needs_position: bool = True
+    """False: it can be flown by a vehicle that does not know where it is, at least for a while."""
 
 
 _STICKS = CUSTOM | MANUAL_INPUT | STABILIZE
@@ -43,19 +45,24 @@ _STICKS = CUSTOM | MANUAL_INPUT | STABILIZE
 class Mode(Enum):
     """A flight mode."""
 
-    MANUAL = ModeTraits("Manual", MainMode.MANUAL, base_mode=_STICKS, flies=False)
-    ALTITUDE = ModeTraits("Altitude", MainMode.ALTITUDE, base_mode=_STICKS, standard_mode=4, flies=False)
+    MANUAL = ModeTraits("Manual", MainMode.MANUAL, base_mode=_STICKS, flies=False, needs_position=False)
+    ALTITUDE = ModeTraits(
+        "Altitude", MainMode.ALTITUDE, base_mode=_STICKS, standard_mode=4, flies=False, needs_position=False
+    )
     POSITION = ModeTraits("Position", MainMode.POSITION, base_mode=_STICKS, standard_mode=1, flies=False)
     POSITION_SLOW = ModeTraits("Position Slow", MainMode.POSITION, 2, base_mode=_STICKS, flies=False)
-    ACRO = ModeTraits("Acro", MainMode.ACRO, base_mode=CUSTOM | MANUAL_INPUT, flies=False)
-    STABILIZED = ModeTraits("Stabilized", MainMode.STABILIZED, base_mode=_STICKS, flies=False)
-    OFFBOARD = ModeTraits("Offboard", MainMode.OFFBOARD, base_mode=CUSTOM | STABILIZE)
+    ORBIT = ModeTraits("Orbit", MainMode.POSITION, 1, base_mode=_STICKS, standard_mode=2, allows_arming=False)
+    ACRO = ModeTraits("Acro", MainMode.ACRO, base_mode=CUSTOM | MANUAL_INPUT, flies=False, needs_position=False)
+    STABILIZED = ModeTraits("Stabilized", MainMode.STABILIZED, base_mode=_STICKS, flies=False, needs_position=False)
+    OFFBOARD = ModeTraits("Offboard", MainMode.OFFBOARD, base_mode=CUSTOM | STABILIZE, needs_position=False)
     TAKEOFF = ModeTraits("Takeoff", MainMode.AUTO, 2, standard_mode=8)
     HOLD = ModeTraits("Hold", MainMode.AUTO, 3)
     MISSION = ModeTraits("Mission", MainMode.AUTO, 4, standard_mode=6)
     RTL = ModeTraits("Return", MainMode.AUTO, 5, standard_mode=5, allows_arming=False)
-    LAND = ModeTraits("Land", MainMode.AUTO, 6, standard_mode=7, allows_arming=False)
-    TERMINATION = ModeTraits("Termination", MainMode.TERMINATION, base_mode=CUSTOM, allows_arming=False)
+    LAND = ModeTraits("Land", MainMode.AUTO, 6, standard_mode=7, allows_arming=False, needs_position=False)
+    TERMINATION = ModeTraits(
+        "Termination", MainMode.TERMINATION, base_mode=CUSTOM, allows_arming=False, needs_position=False
+    )
 
     @property
     def custom_mode(self) -> int:

@@ -10,9 +10,11 @@ from sitl.autopilot.geofence import Geofence
 from sitl.autopilot.mission_flight import MissionFlight, Outcome
 from sitl.autopilot.modes import Mode
 from sitl.autopilot.offboard import Offboard
+from sitl.autopilot.orbit import Orbit, OrbitOrder
 from sitl.autopilot.places import LocalPoint
 from sitl.autopilot.plan import PLACES, Cmd, Plan, latitude_deg, longitude_deg
 from sitl.autopilot.reports import Severity
+from sitl.dynamics.state import Guidance
 from sitl.snapshot import Snapshot
 
 
@@ -25,10 +27,12 @@ class Navigator:
         self._fence = fence
         self._takeoff = Takeoff(craft)
         self._hold = Hold(craft)
+        self._orbit = Orbit(craft)
         self.mission = MissionFlight(craft, on_reached)
         self._modes: dict[Mode, FlightMode] = {
             Mode.TAKEOFF: self._takeoff,
             Mode.HOLD: self._hold,
+            Mode.ORBIT: self._orbit,
             Mode.LAND: Land(craft),
             Mode.RTL: Return(craft),
             Mode.POSITION: Descend(craft),
@@ -39,6 +43,10 @@ class Navigator:
     def order_takeoff(self, altitude_amsl_m: float, yaw_rad: float) -> None:
         """NAV_TAKEOFF: for the next time that Takeoff begins."""
         self._takeoff.order(altitude_amsl_m, yaw_rad)
+
+    def order_orbit(self, order: OrbitOrder) -> None:
+        """DO_ORBIT: for when Orbit is flown, now or very soon."""
+        self._orbit.order(order)
 
     def reposition(self, target: LocalPoint, yaw_rad: float, s: Snapshot, now_s: float) -> None:
         """DO_REPOSITION: for Hold, now or very soon; a NaN coordinate keeps what there is, all NaN is a pause."""
@@ -83,6 +91,13 @@ class Navigator:
 
     def update(self, mode: Mode, s: Snapshot, now_s: float) -> Mode | None:
         """Fly a mode for one tick; returns the mode that follows when it has come to its end."""
+        following = self._fly(mode, s, now_s)
+        point, control = self._craft.region_of_interest, self._craft.control
+        if point is not None and control.guidance is Guidance.WAYPOINT:
+            control.turn_to(math.atan2(point.y_m - s.y_m, point.x_m - s.x_m))
+        return following
+
+    def _fly(self, mode: Mode, s: Snapshot, now_s: float) -> Mode | None:
         entering = mode is not self._flown
         if entering:
             self._leave()

@@ -99,6 +99,11 @@ class Offboard:
     def ever_heard(self) -> bool:
         return self._setpoint is not None
 
+    @property
+    def needs_position(self) -> bool:
+        """Whether the last setpoint can be flown only by a vehicle that knows where it is."""
+        return not isinstance(self._setpoint, AttitudeSetpoint)
+
     def is_alive(self, now_s: float) -> bool:
         """Whether a setpoint has come within COM_OF_LOSS_T."""
         return now_s - self._received_s < self._parameters["COM_OF_LOSS_T"]

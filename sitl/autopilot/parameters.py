@@ -22,11 +22,20 @@ class Parameters:
         table: what there is, sorted by name.
         speed: simulated seconds per wall-clock second; the loss timeouts grow with it.
         on_change: called with a name whose value has changed, and once per name at the start.
+        kept: values from before this boot; what is set is put into it.
     """
 
-    def __init__(self, table: Iterable[Parameter], speed: float, on_change: Callable[[str, float], None]) -> None:
+    def __init__(
+        self,
+        table: Iterable[Parameter],
+        speed: float,
+        on_change: Callable[[str, float], None],
+        kept: dict[str, float | int] | None = None,
+    ) -> None:
         self._table = {parameter.name: parameter for parameter in table}
         self._stored = {parameter.name: _as_stored(parameter.default) for parameter in self._table.values()}
+        self._kept = {} if kept is None else kept
+        self._stored.update({name: value for name, value in self._kept.items() if name in self._table})
         self._speed = speed
         self._on_change = on_change
         self._applied: dict[str, float] = {}
@@ -53,6 +62,7 @@ class Parameters:
         changed = value != self._stored[name]
         self._stored[name] = value
         if changed:
+            self._kept[name] = value
             self._apply(name)
         return changed
 

@@ -12,7 +12,7 @@ LANDED_THRUST_SHARE = 0.1
 LANDED_FACTOR = 2.5
 """Who has landed may move this much more before it counts as flying again."""
 
-_MOTORS_OFF = int(Guidance.MOTORS_OFF)
+_MOTORS_OFF, _ATTITUDE, _RATES = (int(Guidance[name]) for name in ("MOTORS_OFF", "ATTITUDE", "RATES"))
 
 
 @compiled
@@ -47,7 +47,8 @@ def _touches(v: Any, g: Any, wider: float) -> bool:
     low = g.MPC_THR_MIN + CONTACT_THRUST_SHARE * (g.MPC_THR_HOVER - g.MPC_THR_MIN)
     if v.setpoint_thrust > low:
         return False
-    descending = v.setpoint_velocity_m_s[2] >= 1.1 * g.LNDMC_Z_VEL_MAX  # false for NaN
+    by_thrust = v.guidance == _ATTITUDE or v.guidance == _RATES  # little of it is a descent that was ordered
+    descending = by_thrust or v.setpoint_velocity_m_s[2] >= 1.1 * g.LNDMC_Z_VEL_MAX  # false for NaN
     if v.maybe_landed == 0 and v.landed == 0 and not descending:
         return False
     vertical = abs(v.velocity_m_s[2] + v.velocity_error_m_s[2])

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from missions.kernels import compiled
 from missions.obstacles import Obstacles, clearance_at, terrain_height_at
 from sitl.dynamics.airframe import GRAVITY_M_S2
-from sitl.dynamics.rotation import yaw_of
+from sitl.dynamics.rotation import body_z, yaw_of
 from sitl.dynamics.state import Crash
 
 Array = npt.NDArray[np.float64]
@@ -18,6 +18,8 @@ SAFE_DESCENT_M_S = 4.0
 """Faster than this onto the ground is a collision; landings come down at 0.3 to 2 m/s."""
 SAFE_SLIDE_M_S = 3.0
 """Faster than this across the ground breaks the vehicle: it tips over, or has hit a slope."""
+SAFE_TILT_COS = 0.5
+"""Touching the ground with more than 60 degrees of tilt breaks the vehicle, too."""
 RESTING_M = 0.05
 """A fallen vehicle comes to rest on an obstacle that is this near to its centre."""
 
@@ -44,7 +46,8 @@ def touch_ground(v: Any, terrain: Obstacles, lift_g: float) -> None:
         return
     if v.grounded == 0:
         across_m_s = math.hypot(v.velocity_m_s[0], v.velocity_m_s[1])
-        if across_m_s > SAFE_SLIDE_M_S:
+        upright = body_z((v.attitude[0], v.attitude[1], v.attitude[2], v.attitude[3]))[2]
+        if across_m_s > SAFE_SLIDE_M_S or upright < SAFE_TILT_COS:
             crash(v, _TERRAIN, 0)
         elif v.velocity_m_s[2] > SAFE_DESCENT_M_S:
             crash(v, _GROUND, 0)

@@ -22,11 +22,11 @@ RATE_LIMIT_RAD_S = 18.85
 
 @compiled
 def spin_rotors(v: Any, a: Any, dt_s: float) -> None:
-    """MR-1: the rotors follow their signals; those of a broken vehicle do not turn."""
+    """MR-1: the rotors follow their signals as well as they can; those of a broken vehicle do not turn."""
     share = dt_s / (a.rotor_lag_s + dt_s)
     whole = v.crash == _NONE or v.crash == _GROUND
     for k in range(4):
-        signal = v.motor[k] if whole else 0.0
+        signal = v.motor[k] * v.rotor_health[k] if whole else 0.0
         v.rotor[k] += share * (signal - v.rotor[k])
 
 

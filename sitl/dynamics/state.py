@@ -66,6 +66,7 @@ VEHICLE = record(
         ("rates_rad_s", "f8", 3),
         ("specific_force_m_s2", "f8", 3),  # body frame: what an accelerometer measures
         ("rotor", "f8", 4),  # rotor speeds as the signal that they have settled to, [0, 1]
+        ("rotor_health", "f8", 4),  # share of its signal that each rotor follows: 1 whole, 0 failed
         ("gust_m_s", "f8", 3),
         ("grounded", "i8"),
         ("crash", "i8"),
@@ -75,6 +76,9 @@ VEHICLE = record(
         ("origin_longitude_rad", "f8"),
         ("origin_altitude_m", "f8"),
         ("ground_offset_m", "f8"),
+        ("position_std_m", "f8", 3),  # how far the errors wander
+        ("velocity_std_m_s", "f8"),
+        ("dead_reckoning", "i8"),  # nothing tells where the vehicle is: the errors grow
         ("position_error_m", "f8", 3),
         ("velocity_error_m_s", "f8", 3),
         ("tilt_error_rad", "f8", 3),
@@ -138,5 +142,6 @@ def new_fleet(n_vehicles: int) -> np.ndarray:
     fleet = np.zeros(n_vehicles, dtype=VEHICLE)
     for quaternion in ("attitude", "estimated_attitude", "setpoint_attitude"):
         fleet[quaternion][:, 0] = 1.0
+    fleet["rotor_health"] = 1.0
     fleet["grounded"] = fleet["ground_contact"] = fleet["maybe_landed"] = fleet["landed"] = 1
     return fleet

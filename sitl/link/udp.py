@@ -95,7 +95,7 @@ class FleetLinks:
 
     def _open_one(self, port: _Port) -> None:
         host = self._settings.host
-        end = _bind(host, port.own, f"{port.link.value} link of vehicle {port.sysid}")
+        end = bind(host, port.own, f"{port.link.value} link of vehicle {port.sysid}")
         peer = (host, port.peer) if port.peer is not None else None
         self._ends[port.link is Link.GROUND][port.sysid] = end, peer
         asyncio.get_running_loop().add_reader(end, self._receive, port.sysid, port.link, end)
@@ -111,7 +111,12 @@ class FleetLinks:
         self.send()
 
 
-def _bind(host: str, port: int, purpose: str) -> socket.socket:
+def bind(host: str, port: int, purpose: str) -> socket.socket:
+    """A UDP socket that does not block.
+
+    Raises:
+        PortInUse: somebody else has it.
+    """
     bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     bound.setblocking(False)
     bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)

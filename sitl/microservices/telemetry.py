@@ -65,6 +65,8 @@ def sys_status(m: Moment) -> tuple:
     battery = m.autopilot.battery
     armable = m.autopilot.commander.armed or m.autopilot.commander.ready
     health = SENSORS_HEALTHY | (PREARM_BIT if armable else 0)
+    if m.s.dead_reckoning:
+        health &= ~mavlink.MAV_SYS_STATUS_SENSOR_GPS
     voltage_mv, percent = round(battery.voltage_v * 1e3), round(battery.remaining * 100.0)
     load = 180
     return SENSORS_PRESENT, SENSORS_ENABLED, health, load, voltage_mv, -100, percent, 0, 0, 0, 0, 0, 0, 0, 0, 1
@@ -165,8 +167,10 @@ def attitude_quaternion(m: Moment) -> tuple:
     return m.time_boot_ms, s.qw, s.qx, s.qy, s.qz, s.p_rad_s, s.q_rad_s, s.r_rad_s, (0.0,) * 4
 
 
-def local_position_ned(m: Moment) -> tuple:
+def local_position_ned(m: Moment) -> tuple | None:
     s = m.s
+    if not m.autopilot.craft.position_valid:
+        return None
     return m.time_boot_ms, s.x_m, s.y_m, s.z_m, s.vx_m_s, s.vy_m_s, s.vz_m_s
 
 
@@ -183,8 +187,10 @@ def odometry(m: Moment) -> tuple:
     return m.time_us, ned, ned, *pose, *motion, pose_covariance, velocity_covariance, 0, autopilot, 0
 
 
-def global_position_int(m: Moment) -> tuple:
+def global_position_int(m: Moment) -> tuple | None:
     s = m.s
+    if not m.autopilot.craft.position_valid:
+        return None
     place = _e7(s.latitude_deg), _e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
     velocity = round(s.vx_m_s * 100.0), round(s.vy_m_s * 100.0), round(s.vz_m_s * 100.0)
     return m.time_boot_ms, *place, *velocity, round(_heading_deg(s.yaw_rad) * 100.0) % 36000
@@ -192,6 +198,8 @@ def global_position_int(m: Moment) -> tuple:
 
 def gps_raw_int(m: Moment) -> tuple:
     s = m.s
+    if s.dead_reckoning:
+        return m.time_us, 1, 0, 0, 0, 65535, 65535, 65535, 65535, 0, 0, 0, 0, 0, 0, 0
     altitude_mm = round(s.altitude_m * 1e3)
     course = round(_heading_deg(math.atan2(s.vy_m_s, s.vx_m_s)) * 100.0) % 36000
     place = _e7(s.latitude_deg), _e7(s.longitude_deg), altitude_mm
@@ -223,6 +231,8 @@ def scaled_pressure(m: Moment) -> tuple:
 
 def estimator_status(m: Moment) -> tuple:
     flags = 895  # attitude, velocities, positions absolute and predicted, height above ground
+    if not m.autopilot.craft.position_valid:
+        flags &= ~(2 | 8 | 16 | 256 | 512)  # horizontal velocity and positions
     across, up = m.positioning.horizontal_std_m, m.positioning.vertical_std_m
     return m.time_us, flags, 0.1, 0.05, 0.04, 0.08, 0.01, NAN, across, up
 

@@ -1,5 +1,6 @@
 """The `sitl` program: starts, says so, takes no port from others, and leaves nothing behind."""
 
+import json
 import os
 import signal
 import socket
@@ -80,6 +81,8 @@ def test_a_port_in_use_is_named(base):
         (("indoor", "--speed", "0"), "--speed"),
         (("--vehicles", "0"), "--vehicles"),
         (("indoor", "--airframe", "zeppelin"), "--airframe"),
+        (("indoor", "--fault", "lightning:vehicle=1"), "--fault lightning:vehicle=1: Invalid value 'lightning'"),
+        (("indoor", "--fault", "reboot:vehicle=3"), "expected one of 1, 2, found 3"),
         (("indoor", "--truth", "/no/such/folder/truth.csv"), "/no/such/folder/truth.csv"),
     ],
 )
@@ -146,3 +149,17 @@ def test_onboard_ports_that_are_none_are_refused(ports):
     done = subprocess.run([str(SITL), "--onboard-ports", ports, "--vehicles", "1"], capture_output=True, text=True)
     assert done.returncode == 2
     assert "expected two ports from 1024" in " ".join(done.stderr.replace("│", " ").split())
+
+
+def test_faults_are_ordered_while_it_runs(base, ground):
+    with running_sitl("--vehicles", "2", "--fault", "battery:vehicle=2,remaining=0.5", base=base):
+        ground.until(lambda: ground.last("SYS_STATUS", 2))
+        assert ground.last("SYS_STATUS", 2).battery_remaining == 50
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as experimenter:
+            experimenter.settimeout(5.0)
+            experimenter.sendto(b'{"type": "link", "vehicle": 1, "loss": 1.0}\n', ("127.0.0.1", 14990 + base))
+            assert json.loads(experimenter.recv(2048))["ok"]
+        ground.listen()
+        ground.forget()
+        ground.until(lambda: len(ground.of("ATTITUDE")) > 10)
+        assert {m.get_srcSystem() for m in ground.heard} == {2}

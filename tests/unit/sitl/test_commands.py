@@ -7,7 +7,7 @@ import pytest
 
 from sitl.dialect import mavlink
 from sitl.microservices.outbox import Link
-from tests.unit.sitl.flown import NAN, Flown, place
+from tests.unit.sitl.flown import NAN, Flown, place, waypoint
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 
@@ -15,6 +15,11 @@ ON_THE_GROUND = [
     *[(number, (), UNSUPPORTED) for number in (16, 17, 92, 115, 183, 193, 207, 208, 224, 2000, 31000, 40000, 65000)],
     *[(number, (), None) for number in (211, 420, 1000, 3000)],
     *[(number, (), ACCEPTED) for number in (20, 21, 401, 410, 520)],
+    (34, (10, 2, 0, 0, 47.4, 8.5, 500.0), ACCEPTED),
+    (187, (0.5,), ACCEPTED),
+    (195, (0, 0, 0, 0, 47.4, 8.5, 500.0), ACCEPTED),
+    (195, (0, 0, 0, 0, NAN, NAN, 500.0), DENIED),
+    (197, (), ACCEPTED),
     (178, (1, 3), ACCEPTED),
     (178, (1, -5), ACCEPTED),
     (179, (1,), ACCEPTED),
@@ -24,7 +29,9 @@ ON_THE_GROUND = [
     (192, (-1, 1, 0, NAN, 47.9, 8.5, 500.0), ACCEPTED),
     (192, (-1, 0, 0, NAN, 47.9, 8.5, 500.0), UNSUPPORTED),
     (192, (-1, 1, 0, NAN, 147.9, 8.5, 500.0), DENIED),
-    (246, (1,), UNSUPPORTED),
+    (246, (0,), ACCEPTED),
+    (246, (1,), ACCEPTED),
+    (246, (2,), UNSUPPORTED),
     (262, (5,), ACCEPTED),
     (262, (99,), FAILED),
     (300, (), DENIED),
@@ -135,6 +142,76 @@ def test_change_speed_holds_for_what_is_flown_next():
 
 def test_a_reboot_in_the_air_is_denied():
     assert Flown().take_off(3.0).command(246, 1) == DENIED
+
+
+def radius(flown: Flown, north_m: float, east_m: float) -> float:
+    return float(np.hypot(flown.position[1] - north_m, flown.position[0] - east_m))
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_an_orbit_is_flown_around_its_centre_with_the_nose_to_it(turn):
+    flown = Flown().take_off(4.0)
+    x, y = place(12.0, 0.0)
+    assert flown.command(34, turn * 6.0, 2.0, 0, NAN, x * 1e-7, y * 1e-7, 489.4 + 5.0) == ACCEPTED
+    flown.run(15.0)
+    assert flown.last("HEARTBEAT").custom_mode == 0x01030000
+    bearings = []
+    for _ in range(20):
+        flown.run(0.5)
+        assert radius(flown, 12.0, 0.0) == pytest.approx(6.0, abs=0.4)
+        assert np.linalg.norm(flown.velocity) == pytest.approx(2.0, abs=0.3)
+        to_centre = math.atan2(-flown.position[0], 12.0 - flown.position[1])
+        assert abs(math.remainder(flown.autopilot.snapshot.yaw_rad - to_centre, 2 * math.pi)) < 0.3
+        bearings.append(math.atan2(flown.position[0], flown.position[1] - 12.0))
+    assert flown.height == pytest.approx(5.0, abs=0.2)
+    turned = np.unwrap(bearings)[-1] - bearings[0]
+    assert turned == pytest.approx(turn * 2.0 / 6.0 * 9.5, abs=0.5)
+
+
+def test_the_nose_turns_to_the_region_of_interest_and_away_again():
+    flown = Flown().take_off(4.0)
+    x, y = place(0.0, 50.0)
+    flown.command(195, 0, 0, 0, 0, x * 1e-7, y * 1e-7, 489.4)
+    flown.run(5.0)
+    assert flown.autopilot.snapshot.yaw_rad == pytest.approx(math.pi / 2, abs=0.05)
+    x, y = place(40.0, 0.0)
+    flown.command(192, -1, 1, 0, NAN, x * 1e-7, y * 1e-7, 493.4)
+    flown.run(6.0)
+    to_place = math.atan2(50.0 - flown.position[0], -flown.position[1])
+    assert flown.autopilot.snapshot.yaw_rad == pytest.approx(to_place, abs=0.1)
+    flown.command(197)
+    flown.run(4.0)
+    assert abs(flown.autopilot.snapshot.yaw_rad) < 0.1  # along the way
+
+
+# ---------------------------------------------------------------------- reboot
+def test_a_reboot_is_answered_then_silent_then_a_boot_that_remembers():
+    flown = Flown().boot()
+    flown.set_parameter("MIS_TAKEOFF_ALT", 6.0)
+    flown.upload([waypoint(5.0, 0.0, 4.0)])
+    plan = flown.last("MISSION_CURRENT").mission_id
+    assert flown.command(246, 1) == ACCEPTED
+    flown.forget()
+    flown.run(0.9)
+    assert not flown.heard(Link.GROUND)
+    assert flown.command(401) is None
+    flown.run(1.2)
+    assert flown.last("ATTITUDE").time_boot_ms < 1500
+    assert flown.last("HEARTBEAT").system_status == 3
+    assert flown.autopilot.parameters.stored("MIS_TAKEOFF_ALT") == 6.0
+    assert flown.last("MISSION_CURRENT").mission_id == plan != 0
+    assert flown.command(300) == ACCEPTED
+
+
+def test_utc_goes_on_through_a_reboot():
+    flown = Flown().boot()
+    before = flown.last("SYSTEM_TIME").time_unix_usec
+    at_s = flown.last("SYSTEM_TIME").time_boot_ms / 1e3
+    flown.command(246, 1)
+    flown.run(3.0)
+    after = flown.last("SYSTEM_TIME")
+    assert after.time_boot_ms < 3000
+    assert before < after.time_unix_usec < before + (flown.time_s - at_s) * 1e6 + 1
 
 
 def test_requested_messages_come_once():

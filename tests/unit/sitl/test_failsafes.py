@@ -186,6 +186,37 @@ def test_return_climbs_flies_home_and_lands_there():
     assert any("RTL: start return at 519 m (30 m above destination)" in text for text in flown.texts)
 
 
+RALLY = [(6, 5100, 0, 0, 0, 0, *place(40.0, 15.0), 0.0), (6, 5100, 0, 0, 0, 0, *place(-60.0, 0.0), 0.0)]
+
+
+@pytest.mark.parametrize(("kind", "there"), [(0, (0.0, 15.0)), (1, (15.0, 40.0))])
+def test_return_flies_to_the_nearest_of_home_and_rally_points(kind, there):
+    flown = Flown().take_off(5.0)
+    flown.upload(RALLY, kind=2)
+    flown.set_parameter("RTL_TYPE", 1)
+    flown.set_parameter("RTL_RETURN_ALT", 8.0)
+    if kind == 0:
+        flown.set_parameter("RTL_TYPE", 0)
+        flown.upload([(6, 5100, 0, 0, 0, 0, *place(15.0, 0.0), 0.0), RALLY[0]], kind=2)
+    x, y = place(25.0, 0.0)
+    flown.command(192, -1, 1, 0, NAN, x * 1e-7, y * 1e-7, 494.4)
+    flown.run(10.0)
+    flown.command(20)
+    flown.until(lambda: not flown.armed, 60.0)
+    assert np.allclose(flown.position[:2], there, atol=0.4)
+
+
+def test_return_goes_home_when_that_is_nearest():
+    flown = Flown().take_off(5.0)
+    flown.upload(RALLY, kind=2)
+    x, y = place(6.0, 0.0)
+    flown.command(192, -1, 1, 0, NAN, x * 1e-7, y * 1e-7, 494.4)
+    flown.run(8.0)
+    flown.command(20)
+    flown.until(lambda: not flown.armed, 60.0)
+    assert np.allclose(flown.position[:2], 0.0, atol=0.4)
+
+
 def test_return_near_home_stays_low():
     flown = Flown().take_off(5.0)
     x, y = place(6.0, 0.0)

@@ -7,7 +7,7 @@ import pytest
 
 from missions.mission import Blackout, LinkSettings
 from sitl.dialect import mavlink
-from sitl.link.ground_link import Direction, GroundLink
+from sitl.link.faulty_link import Direction, FaultyLink
 from sitl.microservices.outbox import Link
 from sitl.wire import LAYOUTS
 from tests.unit.sitl.flown import COMPANION, GCS, Flown, field
@@ -171,8 +171,8 @@ def test_home_is_known_after_boot_and_moves_with_arming():
 
 
 # ---------------------------------------------------------------- ground link
-def sent(settings: LinkSettings, n: int = 2000, since_takeoff_s: float | None = None) -> tuple[GroundLink, list[bytes]]:
-    link = GroundLink(settings, np.random.default_rng(1))
+def sent(settings: LinkSettings, n: int = 2000, since_takeoff_s: float | None = None) -> tuple[FaultyLink, list[bytes]]:
+    link = FaultyLink(settings, np.random.default_rng(1))
     for i in range(n):
         link.send(Direction.UP, i.to_bytes(2, "little"), 0.0, since_takeoff_s)
     return link, link.arrived(Direction.UP, 10.0)
@@ -190,7 +190,7 @@ def test_losses_are_as_many_as_ordered_and_the_same_for_one_seed():
 
 
 def test_delays_hold_datagrams_back():
-    link = GroundLink(LinkSettings(delay_s=0.1, jitter_s=0.05), np.random.default_rng(1))
+    link = FaultyLink(LinkSettings(delay_s=0.1, jitter_s=0.05), np.random.default_rng(1))
     for _ in range(100):
         link.send(Direction.DOWN, b"x", 1.0, None)
     assert link.arrived(Direction.DOWN, 1.099) == []
