@@ -1,6 +1,5 @@
 """The `sitl` program with many vehicles: its CPU time, memory and pace while all their telemetry is received."""
 
-import os
 import selectors
 import socket
 import subprocess
@@ -31,9 +30,11 @@ class Window:
     """What one stretch of time has cost."""
 
     cpu_s: float
+    waited_s: float
+    """For a core, while other programs had them."""
     wall_s: float
     simulated_s: float
-    messages: int
+    messages: float
     """Received on both links of all vehicles."""
 
 
@@ -139,8 +140,7 @@ class FleetRun:
         """What the next seconds cost."""
         before = self._now()
         self.listener.listen(WINDOW_S)
-        cpu_s, wall_s, simulated_s, messages = (b - a for a, b in zip(before, self._now(), strict=True))
-        return Window(cpu_s, wall_s, simulated_s, int(messages))
+        return Window(*(b - a for a, b in zip(before, self._now(), strict=True)))
 
     def take_off(self, n_vehicles: int) -> None:
         """Arm everybody and let them climb to their take-off height.
@@ -158,11 +158,12 @@ class FleetRun:
         if self.listener.lowest_m < 1.0:
             raise RuntimeError(f"all should be above 1 m by now, and one is at {self.listener.lowest_m:.1f} m")
 
-    def _now(self) -> tuple[float, float, float, float]:
-        """CPU time of the process, wall clock, vehicle time, messages received."""
-        fields = Path(f"/proc/{self._pid}/stat").read_text().rsplit(")", 1)[1].split()
-        cpu_s = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-        return cpu_s, time.monotonic(), self.listener.simulated_s, float(self.listener.messages)
+    def _now(self) -> tuple[float, ...]:
+        """What a `Window` is the difference of."""
+        ran_ns, waited_ns, _ = Path(f"/proc/{self._pid}/schedstat").read_text().split()
+        listener = self.listener
+        now_s = time.monotonic()
+        return int(ran_ns) * 1e-9, int(waited_ns) * 1e-9, now_s, listener.simulated_s, float(listener.messages)
 
 
 @contextmanager
