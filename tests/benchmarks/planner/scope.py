@@ -54,4 +54,5 @@ def quick(seeds: range) -> Scope:
         fleets=(50,),
         fleet_runs=1,
         hard_runs=1,
+        hard_s=1.0,
     )
