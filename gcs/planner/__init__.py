@@ -3,7 +3,7 @@
 Layers, each importing only what stands below it:
 
     planner                              plan_mission: the way in
-    search                               swarms, polish and judge in turn
+    search, baselines                    swarms, polish and judge in turn; what they are compared with
     allocation, target_order             who flies where, and in which order
     cooperation, guide_path              one swarm per vehicle; ways around obstacles
     assembly                             the plan that is handed out
