@@ -23,6 +23,7 @@ PENALTY = 0.3
 MEAN_UNIT_SHARE = 0.1
 """A mean separation that is off by this share of its upper bound, or of the mission's size, is a violation of one."""
 
+MOST_SAMPLES = 512
 MOST_CONTROL_POINTS = 24
 """Of curves that follow a guide path; targets on the way come on top of what the mission says."""
 
@@ -87,8 +88,10 @@ class Care:
     turn_share: float = 0.02
 
     def raised(self) -> "Care":
-        """For a plan that the judge refused: twice as close, twice as far away."""
-        return Care(2 * self.samples, 2.0 * self.distance_share, 2.0 * self.share, 2.0 * self.turn_share)
+        """For a plan that the judge refused: twice as close, up to a limit, and twice as far away."""
+        return Care(
+            min(2 * self.samples, MOST_SAMPLES), 2.0 * self.distance_share, 2.0 * self.share, 2.0 * self.turn_share
+        )
 
 
 def guides_along(mission: Mission, ways: Sequence[Way], n_control: int) -> list[Guide]:

@@ -6,7 +6,7 @@ the samples that the search looks at, it looks closer from then on and keeps far
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -25,17 +25,17 @@ from missions.mission import Mission
 Array = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-QUICK = (Stage(1.0, 20), Stage(30.0, 20), Stage(1000.0, 20))
+QUICK = (Stage(30.0, 20), Stage(1000.0, 20))
 """Polish of the first particles: a feasible plan soon."""
-LONE_EVALUATIONS = 60
+LONE_EVALUATIONS = 40
 """Of the first descent of each vehicle."""
 THOROUGH = (Stage(1.0, 50), Stage(10.0, 30), Stage(100.0, 20), Stage(1000.0, 20))
 """Polish of what a round of the swarms has found."""
 MEND = (Stage(1000.0, 40),)
 """Polish of a plan that is all but feasible ..."""
-REPAIR = (Stage(10.0, 20), Stage(1000.0, 30))
+REPAIR = (Stage(1.0, 30), Stage(10.0, 30), Stage(100.0, 20), Stage(1000.0, 20))
 """... or that the judge refused, once the search looks closer."""
-INSISTENT = ((Stage(100.0, 40),), (Stage(1000.0, 40),))
+INSISTENT = ((Stage(100.0, 40),), (Stage(10.0, 30), Stage(100.0, 30), Stage(1000.0, 30)))
 """Polish of a first plan that is not feasible yet, but nearly."""
 NEARLY_FEASIBLE = 0.1
 STUCK = 1e-2
@@ -56,7 +56,7 @@ POINTS_PER_CORNER = 3
 """Control points of curves along guide paths, at first."""
 MERIT_STRICTNESS = 100.0
 """Two polished plans are compared with violations weighing so many times more than in the search."""
-MOST_RAISES = 3
+MOST_RAISES = 5
 """How often the search may be made more careful."""
 
 
@@ -180,7 +180,7 @@ class FleetSearch:
 
     def _polish_from(self, offsets: Array, stages: tuple[Stage, ...]) -> None:
         refined = self._refined(offsets, stages)
-        improved = self._present is None or self._merit(refined) < self._merit(self._present)
+        improved = self._present is None or self._rank(refined) < self._rank(self._present)
         if self._present is None or improved:
             self._present = refined
         self._swarms.adopt(self._present.offsets)
@@ -241,6 +241,10 @@ class FleetSearch:
     def _look_closer(self, offsets: Array) -> None:
         """Mend a breach that the search did not see, and see such ones from now on."""
         if self._raises == MOST_RAISES:
+            assert self._present is not None
+            self._present = replace(
+                self._present, violation=np.inf
+            )  # whatever comes next is better than a refused plan
             return
         self._raises += 1
         self._care = self._care.raised()
@@ -248,6 +252,10 @@ class FleetSearch:
         self._swarms.pose(self._problem)
         self._present = None
         self._polish_from(offsets, REPAIR)
+
+    def _rank(self, refined: Refined) -> tuple[bool, float]:
+        """The lower the better: what looks feasible comes before whatever does not."""
+        return refined.violation >= LOOKS_FEASIBLE, self._merit(refined)
 
     def _merit(self, refined: Refined) -> float:
         return refined.objective + MERIT_STRICTNESS * self._problem.terms.penalty_weight * refined.violation
