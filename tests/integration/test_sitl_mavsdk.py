@@ -3,12 +3,9 @@
 import asyncio
 import json
 import math
-from collections.abc import AsyncIterator, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from collections.abc import Iterator
 
 import pytest
-from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
@@ -21,6 +18,7 @@ from mavsdk.plugins.offboard import AccelerationNed, PositionNedYaw, VelocityNed
 from mavsdk.plugins.telemetry import FlightMode, LandedState
 
 from sitl.dialect import mavlink
+from tests.integration.mavsdk_companion import companion, until
 from tests.integration.sitl_process import GroundStation, free_instance_base, running_sitl
 
 pytestmark = pytest.mark.processes
@@ -42,26 +40,6 @@ def ground(base) -> Iterator[GroundStation]:
     station = GroundStation(base)
     yield station
     station.close()
-
-
-@asynccontextmanager
-async def companion(base: int, vehicle: int) -> AsyncIterator[tuple]:
-    """MAVSDK on a vehicle's onboard link; the library and the vehicle's system."""
-    asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(16))
-    library = Mavsdk(Configuration.create_manual(vehicle, 191, True))
-    try:
-        await library.add_any_connection(f"udpin://127.0.0.1:{14540 + base + vehicle - 1}")
-        yield library, await library.first_autopilot(10.0)
-    finally:
-        library.destroy()
-
-
-async def until(holds, timeout_s: float = 20.0):
-    """Poll an async condition; what it was."""
-    async with asyncio.timeout(timeout_s):
-        while not (found := await holds()):  # noqa: ASYNC110 - the getters have no event to wait for
-            await asyncio.sleep(0.05)
-    return found
 
 
 async def test_telemetry_and_parameters(base):

@@ -1,0 +1,237 @@
+"""MAVSDK flies the simulator with every plugin that a multirotor's programs use; each test has a vehicle of its own."""
+
+import math
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+
+import pytest
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.geofence import GeofenceAsync
+from mavsdk.asyncio.plugins.mission import MissionAsync
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from mavsdk.asyncio.plugins.offboard import OffboardAsync
+from mavsdk.asyncio.plugins.param import ParamAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.plugins import mission_raw
+from mavsdk.plugins.geofence import Circle, FenceType, GeofenceData, Point, Polygon
+from mavsdk.plugins.mission import MissionItem, MissionPlan
+from mavsdk.plugins.offboard import (
+    AccelerationNed,
+    Attitude,
+    AttitudeRate,
+    PositionGlobalYaw,
+    PositionNedYaw,
+    VelocityBodyYawspeed,
+    VelocityNedYaw,
+)
+from mavsdk.plugins.telemetry import FlightMode
+
+from tests.integration.mavsdk_companion import companion, until
+from tests.integration.sitl_process import free_instance_base, running_sitl
+
+pytestmark = pytest.mark.processes
+
+NAN = math.nan
+FENCE_ITEM = mission_raw.MissionItem(0, 5, 5003, 1, 1, 30.0, 0, 0, 0, 473977432, 85455942, 0.0, 1)
+RALLY_ITEM = mission_raw.MissionItem(0, 6, 5100, 1, 1, 0, 0, 0, 0, 473978332, 85455942, 10.0, 2)
+
+
+@pytest.fixture(scope="module")
+def base() -> Iterator[int]:
+    shift = free_instance_base()
+    with running_sitl("--vehicles", "7", "--speed", "5", base=shift):
+        yield shift
+
+
+@dataclass(frozen=True)
+class Flier:
+    """The plugins on one vehicle."""
+
+    telemetry: TelemetryAsync
+    action: ActionAsync
+    offboard: OffboardAsync
+    parameters: ParamAsync
+    system: object
+
+    async def take_off(self) -> None:
+        """To 5 m, and wait for Hold."""
+        await self.action.set_takeoff_altitude(5.0)
+        await self.action.arm()
+        await self.action.takeoff()
+        await self.in_mode(FlightMode.TAKEOFF)
+        await self.in_mode(FlightMode.HOLD)
+
+    async def in_mode(self, mode: FlightMode) -> None:
+        async def holds() -> bool:
+            return await self.telemetry.flight_mode() == mode
+
+        await until(holds)
+
+    async def position(self) -> tuple[float, float, float]:
+        """North, east, down in the vehicle's own frame [m]."""
+        found = (await self.telemetry.position_velocity_ned()).position
+        return found.north_m, found.east_m, found.down_m
+
+    async def velocity(self) -> tuple[float, float, float]:
+        found = (await self.telemetry.position_velocity_ned()).velocity
+        return found.north_m_s, found.east_m_s, found.down_m_s
+
+    async def comes_to(
+        self, measure: Callable[[], Awaitable[tuple[float, ...]]], wanted: tuple[float, ...], within: float
+    ) -> None:
+        """Wait until a measured vector is what is wanted."""
+
+        async def holds() -> bool:
+            return math.dist(await measure(), wanted) < within
+
+        try:
+            await until(holds)
+        except TimeoutError:
+            raise AssertionError(f"{measure.__name__} is {await measure()}, expected {wanted}") from None
+
+
+@asynccontextmanager
+async def flier(base: int, vehicle: int) -> AsyncIterator[Flier]:
+    """A vehicle that is ready to be armed."""
+    async with companion(base, vehicle) as (_, system):
+        found = Flier(TelemetryAsync(system), ActionAsync(system), OffboardAsync(system), ParamAsync(system), system)
+        await until(found.telemetry.health_all_ok)
+        yield found
+
+
+async def test_offboard_positions_and_velocities(base):
+    async with flier(base, 1) as f:
+        await f.take_off()
+        offboard, (north, east, _) = f.offboard, await f.position()
+        await offboard.set_position_ned(PositionNedYaw(north + 3.0, east, -5.0, 90.0))
+        await offboard.start()
+        await f.in_mode(FlightMode.OFFBOARD)
+        await f.comes_to(f.position, (north + 3.0, east, -5.0), 0.5)
+        await offboard.set_velocity_ned(VelocityNedYaw(0.0, 1.0, 0.0, 90.0))
+        await f.comes_to(f.velocity, (0.0, 1.0, 0.0), 0.3)
+        await offboard.set_velocity_body(VelocityBodyYawspeed(-1.0, 0.0, 0.0, 0.0))
+        await f.comes_to(f.velocity, (0.0, -1.0, 0.0), 0.3)
+        here = await f.position()
+        there = PositionNedYaw(here[0], here[1], -6.0, 90.0)
+        await offboard.set_position_velocity_ned(there, VelocityNedYaw(0.0, 0.0, 0.0, 90.0))
+        await f.comes_to(f.position, (here[0], here[1], -6.0), 0.5)
+        place = await f.telemetry.position()
+        above = PositionGlobalYaw(
+            place.latitude_deg, place.longitude_deg, 8.0, 90.0, PositionGlobalYaw.AltitudeType.REL_HOME
+        )
+        await offboard.set_position_global(above)
+        await f.comes_to(f.position, (here[0], here[1], -8.0), 0.6)
+        await offboard.stop()
+        await f.in_mode(FlightMode.HOLD)
+
+
+async def test_offboard_attitudes_rates_and_accelerations(base):
+    async with flier(base, 2) as f:
+        await f.take_off()
+
+        async def pitch() -> tuple[float]:
+            return ((await f.telemetry.attitude_euler()).pitch_deg,)
+
+        async def yaw_rate() -> tuple[float]:
+            return (math.degrees((await f.telemetry.attitude_angular_velocity_body()).yaw_rad_s),)
+
+        await f.offboard.set_attitude(Attitude(0.0, -10.0, 0.0, 0.6))
+        await f.offboard.start()
+        await f.comes_to(pitch, (-10.0,), 2.0)
+        await f.offboard.set_attitude_rate(AttitudeRate(0.0, 0.0, 30.0, 0.6))
+        await f.comes_to(yaw_rate, (30.0,), 5.0)
+        await f.offboard.set_velocity_ned(VelocityNedYaw(0.0, 0.0, 0.0, 0.0))
+        await f.comes_to(f.velocity, (0.0, 0.0, 0.0), 0.4)
+        await f.offboard.set_acceleration_ned(AccelerationNed(1.0, 0.0, 0.0))
+
+        async def is_fast_northwards() -> bool:
+            return (await f.velocity())[0] > 1.5
+
+        await until(is_fast_northwards)
+        await f.action.hold()
+        await f.in_mode(FlightMode.HOLD)
+
+
+def waypoint(latitude_deg: float) -> MissionItem:
+    return MissionItem(
+        latitude_deg, 8.5455942, 5.0, 3.0, True, NAN, NAN, MissionItem.CameraAction.NONE, NAN, NAN, 1.0, NAN, NAN,
+        MissionItem.VehicleAction.NONE,
+    )  # fmt: skip
+
+
+async def test_missions_are_flown_paused_and_resumed(base):
+    async with flier(base, 3) as f:
+        mission = MissionAsync(f.system)
+        await mission.upload_mission(MissionPlan([waypoint(47.3977932), waypoint(47.3979), waypoint(47.3977932)]))
+        assert len((await mission.download_mission()).mission_items) == 3
+        await f.action.arm()
+        await mission.start_mission()
+
+        async def is_under_way() -> bool:
+            return (await mission.mission_progress()).current >= 1
+
+        await until(is_under_way)
+        await mission.pause_mission()
+        await f.in_mode(FlightMode.HOLD)
+        await mission.start_mission()
+        await until(mission.is_mission_finished, 30.0)
+        await f.action.return_to_launch()
+        await f.in_mode(FlightMode.RETURN_TO_LAUNCH)
+        await mission.clear_mission()
+
+
+async def test_geofences_are_uploaded_and_kept(base):
+    async with flier(base, 4) as f:
+        fence, raw = GeofenceAsync(f.system), MissionRawAsync(f.system)
+        home = await until(f.telemetry.home)
+        south, west = home.latitude_deg - 1.3e-4, home.longitude_deg - 2e-4
+        corners = [
+            Point(south + north, west + east) for north, east in ((0, 0), (0, 4e-4), (2.6e-4, 4e-4), (2.6e-4, 0))
+        ]
+        circle = Circle(Point(home.latitude_deg, home.longitude_deg), 100.0, FenceType.INCLUSION)
+        await fence.upload_geofence(GeofenceData([Polygon(corners, FenceType.INCLUSION)], [circle]))
+        assert [item.command for item in await raw.download_geofence()] == [5001] * 4 + [5003]
+        await f.take_off()
+        await f.offboard.set_velocity_ned(VelocityNedYaw(5.0, 0.0, 0.0, 0.0))
+        await f.offboard.start()
+        await f.in_mode(FlightMode.OFFBOARD)
+        await f.in_mode(FlightMode.HOLD)
+        assert (await f.position())[0] > 10.0
+        await fence.clear_geofence()
+        assert await raw.download_geofence() == []
+
+
+async def test_raw_fences_and_rally_points(base):
+    async with flier(base, 5) as f:
+        raw = MissionRawAsync(f.system)
+        await raw.upload_geofence([FENCE_ITEM])
+        await raw.upload_rally_points([RALLY_ITEM])
+        (fence,), (rally,) = await raw.download_geofence(), await raw.download_rallypoints()
+        assert (fence.command, fence.param1, fence.x) == (5003, 30.0, 473977432)
+        assert (rally.command, rally.x, rally.z) == (5100, 473978332, 10.0)
+
+
+async def test_orders_of_the_action_plugin_and_a_failsafe(base):
+    async with flier(base, 6) as f:
+        await f.action.set_return_to_launch_altitude(8.0)
+        assert await f.action.get_return_to_launch_altitude() == 8.0
+        assert await f.action.get_takeoff_altitude() == 2.5
+        await f.take_off()
+        await f.action.set_current_speed(3.0)
+        place = await f.telemetry.position()
+        await f.action.goto_location(
+            place.latitude_deg + 9e-5, place.longitude_deg, place.absolute_altitude_m + 2.0, 0.0
+        )
+        north, east, down = await f.position()
+        await f.comes_to(f.position, (north + 10.0, east, down - 2.0), 1.0)
+        await f.parameters.set_param_int("COM_LOW_BAT_ACT", 3)
+        await f.parameters.set_param_float("SIM_BAT_DRAIN", 15.0)
+        await f.parameters.set_param_float("SIM_BAT_MIN_PCT", 1.0)
+        await f.in_mode(FlightMode.LAND)
+        await f.action.kill()
+
+        async def is_disarmed() -> bool:
+            return not await f.telemetry.armed()
+
+        await until(is_disarmed)
