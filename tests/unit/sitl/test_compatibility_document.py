@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[3]
 DOCUMENT = (ROOT / "docs" / "compatibility.md").read_text(encoding="utf-8")
 
 
-def tests_with_other_programs() -> set[str]:
+def names_of_tests_with_other_programs() -> set[str]:
     files = re.findall(r"`(tests/integration/test_\w+\.py)`", DOCUMENT)
     return {
         name for file in files for name in re.findall(r"^(?:async )?def (test_\w+)", (ROOT / file).read_text(), re.M)
@@ -16,7 +16,7 @@ def tests_with_other_programs() -> set[str]:
 
 def test_every_row_names_tests_that_exist_and_every_test_has_its_row():
     named = set(re.findall(r"`(test_\w+)`", DOCUMENT))
-    assert named == tests_with_other_programs()
+    assert named == names_of_tests_with_other_programs()
 
 
 def test_versions_are_the_ones_that_are_installed():
