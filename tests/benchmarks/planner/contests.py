@@ -72,6 +72,7 @@ RACE_HEADER = ("mission", "feasible", "first feasible: median (worst) s", "1.01 
 
 def warm_up() -> None:
     """Run everything once that is measured: kernels are compiled, files are read, caches are filled."""
+    plan_within(fleet(1000, 20), 0, evaluations=50)
     for kind in (Kind.TERRAIN, *HARD):
         mission = generate(kind, 1000)
         plan_within(mission, 0, evaluations=300)
