@@ -12,7 +12,6 @@ from typing import Any
 import cma
 import numpy as np
 import numpy.typing as npt
-import pyswarms
 from pymoo.algorithms.soo.nonconvex.pso import PSO
 from pymoo.core.problem import Problem as PymooProblem
 from pymoo.optimize import minimize as pymoo_minimize
@@ -123,7 +122,9 @@ def swarm(attempt: Attempt, rng: np.random.Generator) -> None:
     """Global-best particle swarm with Clerc and Kennedy's constriction (pyswarms)."""
     constriction = {"c1": 1.494, "c2": 1.494, "w": 0.729}
     np.random.seed(_seed(rng))  # noqa: NPY002  it has no other way in
-    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):  # it writes a report.log where it is
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):  # once imported, it writes a report.log
+        import pyswarms
+
         search = pyswarms.single.GlobalBestPSO(
             50, attempt.task.dimension, constriction, init_pos=_starts(attempt, rng, 50)
         )
