@@ -16,11 +16,15 @@ from missions.faults import SIMULATOR_EXAMPLES, parse_simulator_fault
 from missions.frames import GeodeticPoint
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
+from sitl.autopilot.memory import Memory, SigningMemory
+from sitl.autopilot.parameter_table import parameter_table
 from sitl.dynamics.airframe import AirframeName
 from sitl.errors import BadPlace, SitlError
+from sitl.link.parameter_files import ParameterFiles
 from sitl.open_field import open_field
 from sitl.service import serve
 from sitl.settings import COMPANION_PORT, HIGHEST_INSTANCE_BASE, HIGHEST_ONBOARD_PORT, ONBOARD_PORT, Settings
+from sitl.signing_keys import load_signing_keys
 from sitl.simulator import Simulator
 
 BAD_USAGE = 2
@@ -51,6 +55,13 @@ def fly(
         list[str] | None,
         typer.Option(metavar="SPEC", help=f"What goes wrong, e.g. {SIMULATOR_EXAMPLES[1]}; repeatable."),
     ] = None,
+    signing_key: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Keys of the ground links: 64 hex digits, for all or per system id."),
+    ] = None,
+    parameters: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Keep parameters here from one simulation to the next.")
+    ] = None,
     supervised: Annotated[bool, typer.Option("--supervised", help="End when standard input does.")] = False,
 ) -> None:
     """Simulate the vehicles of a mission, each an autopilot with PX4's manners on two UDP ports.
@@ -72,11 +83,14 @@ def fly(
             onboard_port=onboard_port,
             companion_port=companion_port,
             faults=tuple(parse_simulator_fault(text) for text in fault or ()),
+            signing_key=signing_key,
+            parameters=parameters,
             supervised=supervised,
         )
         flown = _mission(mission, vehicles, origin)
-        simulator = warm_simulator(flown, settings)
-        asyncio.run(serve(simulator, settings))
+        files = ParameterFiles(parameters, parameter_table(airframe.airframe)) if parameters else None
+        simulator = warm_simulator(flown, settings, _memories(flown, settings, files))
+        asyncio.run(serve(simulator, settings, files))
     except* (MissionError, SitlError, OSError) as problems:
         for problem in problems.exceptions:
             print(f"sitl: {problem}", file=sys.stderr)
@@ -88,7 +102,7 @@ def main() -> None:
     app()
 
 
-def warm_simulator(mission: Mission, settings: Settings) -> Simulator:
+def warm_simulator(mission: Mission, settings: Settings, memories: dict[int, Memory]) -> Simulator:
     """A simulator whose compiled code is there, so that its first step takes no longer than the others."""
     with _announced("sitl: compiling the physics, on a machine's first run only"), one_at_a_time("sitl"):
         rehearsal = Simulator(mission, seed=settings.seed, airframe=settings.airframe.airframe)
@@ -100,10 +114,26 @@ def warm_simulator(mission: Mission, settings: Settings) -> Simulator:
         speed=settings.speed,
         airframe=settings.airframe.airframe,
         utc_start_us=now_us,
+        memories=memories,
     )
     for fault in settings.faults:
         simulator.order(fault)
     return simulator
+
+
+def _memories(mission: Mission, settings: Settings, files: ParameterFiles | None) -> dict[int, Memory]:
+    """What the vehicles know before their first boot.
+
+    Raises:
+        SitlError: a file with keys or parameters is none.
+        OSError: it cannot be read.
+    """
+    sysids = [vehicle.sysid for vehicle in mission.vehicles]
+    keys = load_signing_keys(settings.signing_key, sysids) if settings.signing_key else {}
+    return {
+        sysid: Memory(parameters=files.load(sysid) if files else {}, signing=SigningMemory(keys.get(sysid)))
+        for sysid in sysids
+    }
 
 
 def _mission(name: str | None, n_vehicles: int | None, origin: str | None) -> Mission:

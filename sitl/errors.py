@@ -1,5 +1,7 @@
 """What can go wrong for whoever starts the simulator."""
 
+from pathlib import Path
+
 
 class SitlError(Exception):
     """Base of the simulator's errors."""
@@ -27,6 +29,35 @@ class NoStandardInput(SitlError):
 
     def __init__(self) -> None:
         super().__init__("--supervised needs a pipe, socket or terminal as standard input")
+
+
+class BadSigningKey(SitlError):
+    """A line of a key file that is no key.
+
+    Args:
+        path: the file.
+        line: its number, from 1; its text is a secret.
+    """
+
+    def __init__(self, path: Path, line: int) -> None:
+        super().__init__(
+            f"--signing-key {path}:{line}: expected 64 hexadecimal digits, not all zero, "
+            "alone in the file or each behind a system id"
+        )
+
+
+class BadParameterFile(SitlError):
+    """A line of a parameter file that is no parameter.
+
+    Args:
+        path: the file.
+        line: its number, from 1.
+        expected: what should stand there.
+        found: what does.
+    """
+
+    def __init__(self, path: Path, line: int, expected: str, found: str) -> None:
+        super().__init__(f"--parameters {path}:{line}: expected {expected}, found {found!r}")
 
 
 class BadPlace(SitlError):

@@ -9,19 +9,20 @@ from typing import Any
 
 from sitl.errors import NoStandardInput
 from sitl.link.control_port import ControlPort
+from sitl.link.parameter_files import ParameterFiles
 from sitl.link.truth_log import TruthLog
 from sitl.link.udp import FleetLinks, run
 from sitl.settings import Settings
 from sitl.simulator import Simulator
 
 
-async def serve(simulator: Simulator, settings: Settings) -> None:
-    """Open the links, say so, and simulate.
+async def serve(simulator: Simulator, settings: Settings, files: ParameterFiles | None) -> None:
+    """Open the links, say so, and simulate; keep changed parameters if there are files for them.
 
     Raises:
         PortInUse: a port is taken.
         NoStandardInput: it shall be supervised, and there is no pipe to watch.
-        OSError: the truth log cannot be written.
+        OSError: the truth log or a parameter file cannot be written.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -35,7 +36,7 @@ async def serve(simulator: Simulator, settings: Settings) -> None:
         try:
             control.open()
             _say_ready(simulator, settings)
-            await _until(stop, run(simulator, links, settings, log))
+            await _until(stop, run(simulator, links, settings, log, files))
         finally:
             control.close()
             links.close()

@@ -33,6 +33,10 @@ class Settings:
     """Of the first vehicle's companion; the others' follow."""
     faults: tuple[SimulatorFault, ...] = ()
     """Beside those of the mission."""
+    signing_key: Path | None = None
+    """File with the keys of the ground links."""
+    parameters: Path | None = None
+    """Folder in which parameters outlast the simulation."""
     supervised: bool = False
     """End when standard input does."""
     host: str = "127.0.0.1"

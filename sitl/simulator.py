@@ -129,6 +129,11 @@ class Simulator:
             self.order(fault)
 
     @property
+    def memories(self) -> dict[int, Memory]:
+        """System id -> what the vehicle keeps for its next boot."""
+        return self._memories
+
+    @property
     def time_s(self) -> float:
         """Simulated time since boot."""
         return self._ticks * TICK_S
@@ -204,7 +209,7 @@ class Simulator:
         """Move what a vehicle has sent to the outside, through the faults of its links."""
         now_s, links, vehicle = self.time_s, self._links[sysid], self.vehicles[sysid]
         perfect = {link: way_out.is_perfect(now_s) for link, way_out in links.items()}
-        for link, frame in vehicle.outbox.take():
+        for link, frame in vehicle.take():
             if perfect[link]:
                 self._out.append((sysid, link, frame))
             else:
@@ -226,6 +231,7 @@ class Simulator:
             positioning=self.mission.simulation.positioning,
             speed=self._speed,
             utc_start_us=self._utc_start_us + round(self.time_s * 1e6),
+            wall_start_us=self._utc_start_us + round(self.time_s / self._speed * 1e6),
             first_view=view,
             memory=self._memories[sysid],
         )

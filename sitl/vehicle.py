@@ -24,6 +24,7 @@ from sitl.microservices.parameter_server import ParameterServer
 from sitl.microservices.peers import Peers
 from sitl.microservices.router import Router
 from sitl.microservices.setpoint_server import SetpointServer
+from sitl.microservices.signing import Signing
 from sitl.microservices.statustext import StatusTexts
 from sitl.microservices.streams import Streams
 from sitl.microservices.telemetry import Moment
@@ -43,7 +44,8 @@ class Vehicle:
         airframe: for the defaults of its parameters.
         positioning: how well it knows where it is, for what it says of that.
         speed: simulated seconds per wall-clock second.
-        utc_start_us: UTC at boot.
+        utc_start_us: UTC at boot, on simulated time.
+        wall_start_us: UTC at boot, on the wall clock that `speed` makes of it.
         first_view: what the autopilot sees before the first tick.
         memory: what it has kept from before this boot.
     """
@@ -58,6 +60,7 @@ class Vehicle:
         positioning: Positioning,
         speed: float,
         utc_start_us: int,
+        wall_start_us: int,
         first_view: Snapshot,
         memory: Memory,
     ) -> None:
@@ -81,6 +84,7 @@ class Vehicle:
         self._crash = first_view.crash
         self._readers = {link: FrameReader() for link in Link}
         self._router = Router(sysid)
+        self._signing = Signing(memory.signing, wall_start_us, speed)
         self._streams = {link: Streams(link, self.outbox, TICK_S) for link in Link}
         self._make_services(speed)
         self.autopilot.tick(first_view, 0.0, 0.0)
@@ -98,6 +102,7 @@ class Vehicle:
         self._targeted = self._targeted_handlers()
         self._untargeted: dict[str, Handler] = {
             "HEARTBEAT": lambda m, s: self._peers.receive_heartbeat(m, self._now_s),
+            "MANUAL_CONTROL": lambda m, s: self._receive_sticks(m),
             "TIMESYNC": lambda m, s: self._clock.receive_timesync(m, s, self._now_s),
             "PING": lambda m, s: self._clock.receive_ping(m, s, self._now_s),
         }
@@ -117,6 +122,7 @@ class Vehicle:
             "SET_POSITION_TARGET_LOCAL_NED": lambda m, s: setpoints.receive_local(m, self._now_s),
             "SET_POSITION_TARGET_GLOBAL_INT": lambda m, s: setpoints.receive_global(m, self._now_s),
             "SET_ATTITUDE_TARGET": lambda m, s: setpoints.receive_attitude(m, self._now_s),
+            "SETUP_SIGNING": self._signing.receive_setup,
             "PARAM_REQUEST_LIST": parameters.receive_list,
             "PARAM_REQUEST_READ": parameters.receive_read,
             "PARAM_SET": parameters.receive_set,
@@ -134,17 +140,28 @@ class Vehicle:
     # ------------------------------------------------------------------ state
     @property
     def dropped(self) -> int:
-        """Frames that could not be read, on both links."""
-        return sum(reader.dropped for reader in self._readers.values())
+        """Frames that could not be read, or were not signed as they must be, on both links."""
+        return self._signing.refused + sum(reader.dropped for reader in self._readers.values())
 
     # ---------------------------------------------------------------- traffic
     def receive(self, link: Link, datagram: bytes) -> None:
         """Take in one datagram; never raises because of what is in it."""
         for message in self._readers[link].read(datagram):
             sender = Sender(link, message.get_srcSystem(), message.get_srcComponent())
+            frame, is_signed = bytes(message.get_msgbuf()), link is Link.GROUND and self._signing.is_on
+            if is_signed and not self._signing.accepts(frame, sender, self._now_s):
+                continue
             if self._router.forwards(message, sender):
-                self.outbox.forward(link.other, bytes(message.get_msgbuf()))
+                self.outbox.forward(link.other, self._signing.stripped(frame) if is_signed else frame)
             self._handle(message, sender)
+
+    def take(self) -> list[tuple[Link, bytes]]:
+        """The frames to be sent, in order; those for the ground are signed if there is a key."""
+        frames = self.outbox.take()
+        if not self._signing.is_on:
+            return frames
+        signed = [(link, self._signing.sign(f, self._now_s) if link is Link.GROUND else f) for link, f in frames]
+        return [(link, frame) for link, frame in signed if frame is not None]
 
     def _handle(self, message: Message, sender: Sender) -> None:
         kind = message.get_type()
@@ -153,6 +170,11 @@ class Vehicle:
             handler = self._targeted.get(kind)
         if handler is not None:
             handler(message, sender)
+
+    def _receive_sticks(self, message: Message) -> None:
+        m = message
+        if m.target == self.sysid:
+            self.autopilot.sticks.receive(m.x, m.y, m.z, m.r, self._now_s)
 
     # ------------------------------------------------------------------- tick
     def tick(self, snapshot: Snapshot, now_s: float, dt_s: float) -> None:

@@ -17,6 +17,7 @@ from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.places import LocalPoint, OwnFrame
 from sitl.autopilot.plan import Plan, altitude_amsl_m, latitude_deg, longitude_deg
 from sitl.autopilot.reports import Result, Say, Severity
+from sitl.autopilot.sticks import Sticks
 from sitl.snapshot import Snapshot, is_broken
 
 FENCE_CHECK_S = 0.2
@@ -58,8 +59,9 @@ class Autopilot:
         self.commander = Commander(self.parameters, say)
         self.failure_detector = FailureDetector(self.parameters)
         self.offboard = Offboard(self.parameters, say)
+        self.sticks = Sticks(self.parameters)
         self.fence = Geofence(self.craft)
-        self.navigator = Navigator(self.craft, self.offboard, self.fence, on_reached)
+        self.navigator = Navigator(self.craft, self.offboard, self.sticks, self.fence, on_reached)
         self.rally = Plan()
         self.reboot_ordered = False
         self.home_known = False
@@ -116,6 +118,8 @@ class Autopilot:
             at_rest=bool(s.grounded),
             position_valid=self.craft.position_valid,
             attitude_failed=self.failure_detector.attitude_failed,
+            sticks_alive=self.sticks.is_alive(self._now_s),
+            throttle=self.sticks.throttle,
         )
 
     def refresh(self) -> Commander:
@@ -181,7 +185,7 @@ class Autopilot:
             self._next_fence_s = now_s + FENCE_CHECK_S
             self._check_fence(s)
         self._announce_landing(bool(s.landed))
-        self.commander.observe(self.situation(), now_s)
+        self.commander.observe(self.situation()._replace(sticks_moved=self.sticks.take_movement()), now_s)
         self.commander.update()
         if not self.home_known and now_s >= HOME_SET_S:
             self.set_home()

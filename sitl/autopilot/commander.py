@@ -11,6 +11,7 @@ from sitl.autopilot.failsafe import MODE_OF_ACTION, Action, Cause, Failsafes
 from sitl.autopilot.modes import Mode
 from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.reports import Result, Say, Severity
+from sitl.autopilot.sticks import HIGH_THROTTLE, RAISED_THROTTLE
 
 BOOT_S = 0.6
 """After this long the estimator has settled and the pre-arm checks may pass."""
@@ -41,6 +42,10 @@ class Situation(NamedTuple):
     """It stands on something."""
     position_valid: bool = True
     attitude_failed: bool = False
+    sticks_alive: bool = False
+    sticks_moved: bool = False
+    throttle: float = -1.0
+    """In [-1, 1]."""
 
 
 class SystemStatus(Enum):
@@ -66,6 +71,8 @@ class Commander:
         self._landed_since_s: float | None = None
         self._flown_since_arming = False
         self._airborne_s = 0.0
+        self._sticks_expected = False
+        """Whether there have been sticks since arming: who arms without does not miss them."""
         self._terminated_s: float | None = None
         self.intended = Mode.HOLD
         self.armed = False
@@ -78,7 +85,7 @@ class Commander:
             return Mode.TERMINATION
         action = self._failsafes.action
         if action <= Action.WARN:
-            return self.intended
+            return self._without_position(self.intended)
         mode = MODE_OF_ACTION.get(action, self.intended)
         return mode if self._situation.position_valid or not mode.value.needs_position else Mode.LAND
 
@@ -118,8 +125,12 @@ class Commander:
         if self._terminated_s is not None or (not forced and (not self.ready or lost_gcs)):
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
             return Result.TEMPORARILY_REJECTED
+        if not forced and self._throttle_is_up():
+            self._say(Severity.CRITICAL, "Arming denied: high throttle")
+            return Result.TEMPORARILY_REJECTED
         self.armed = True
         self._flown_since_arming, self._landed_since_s = False, None
+        self._sticks_expected = False
         self._failsafes.clear()
         self._say(Severity.INFO, f"Armed by {reason}")
         return Result.ACCEPTED
@@ -177,6 +188,7 @@ class Commander:
             if self._now_s - self._terminated_s >= LOCKDOWN_S:
                 self.disarm("lockdown", forced=True)
             return
+        self._let_pilot_take_over()
         self._update_failsafes()
         if self._situation.crashed and self._situation.at_rest:
             self.disarm("failure detector", forced=True)
@@ -193,6 +205,30 @@ class Commander:
         if self._situation.attitude_failed and self._now_s - self._airborne_s < self._parameters["COM_LKDOWN_TKO"]:
             self.disarm("lockdown", forced=True)
 
+    def _let_pilot_take_over(self) -> None:
+        """Sticks that move end an auto mode (COM_RC_OVERRIDE bit 0) or Offboard (bit 1)."""
+        s, allowed = self._situation, int(self._parameters["COM_RC_OVERRIDE"])
+        overridable = (allowed & 1 and self.mode.is_auto) or (allowed & 2 and self.mode is Mode.OFFBOARD)
+        if s.sticks_alive and s.sticks_moved and overridable:
+            self._say(Severity.INFO, "Pilot took over using sticks")
+            self._failsafes.mode_changed()
+            self._intend(Mode.POSITION if s.position_valid else Mode.ALTITUDE)
+
+    def _misses_sticks(self) -> bool:
+        """Whether a pilot's sticks are gone, where COM_RCL_EXCEPT does not do without them."""
+        self._sticks_expected = self._sticks_expected or self._situation.sticks_alive
+        bit = {Mode.MISSION: 1, Mode.HOLD: 2, Mode.TAKEOFF: 2, Mode.OFFBOARD: 4}.get(self.intended, 0)
+        excepted = int(self._parameters["COM_RCL_EXCEPT"]) & bit or self.intended is Mode.LAND
+        return self._sticks_expected and not self._situation.sticks_alive and not excepted
+
+    def _throttle_is_up(self) -> bool:
+        """Whether the motors would spin up, or the vehicle climb, as soon as it is armed."""
+        s, mode = self._situation, self.intended
+        if not s.sticks_alive or not mode.value.needs_sticks:
+            return False
+        by_thrust = mode in (Mode.MANUAL, Mode.STABILIZED, Mode.ACRO)
+        return s.throttle > (HIGH_THROTTLE if by_thrust else RAISED_THROTTLE)
+
     def _update_failsafes(self) -> None:
         s = self._situation
         failing = {
@@ -202,10 +238,11 @@ class Commander:
             Cause.BATTERY_CRITICAL: s.battery is BatteryWarning.CRITICAL,
             Cause.BATTERY_EMERGENCY: s.battery is BatteryWarning.EMERGENCY,
             Cause.GEOFENCE: s.fence_breached and not s.landed,
-            Cause.POSITION_LOST: not s.position_valid and self.intended.value.needs_position,
+            Cause.POSITION_LOST: not s.position_valid and self._without_position(self.intended).value.needs_position,
+            Cause.STICKS_LOST: self._misses_sticks(),
             Cause.ATTITUDE_FAILED: s.attitude_failed and self.intended is not Mode.ACRO,
         }
-        worse = self._failsafes.update(failing, self._now_s)
+        worse = self._failsafes.update(failing, self._now_s, in_haste=self.intended.value.needs_sticks)
         if worse and self._failsafes.delayed > Action.NONE:
             text = f"Failsafe activated: entering Hold for {self._failsafes.delay_s:.0f} seconds"
             self._say(Severity.CRITICAL, text)
@@ -231,6 +268,12 @@ class Commander:
         if mode.value.allows_arming:
             self._mode_after_disarm = mode
 
+    def _without_position(self, mode: Mode) -> Mode:
+        """A pilot who flies by position goes on by altitude where that gets lost."""
+        s = self._situation
+        by_position = mode in (Mode.POSITION, Mode.POSITION_SLOW)
+        return Mode.ALTITUDE if by_position and s.sticks_alive and not s.position_valid else mode
+
     def _may_run(self, mode: Mode, *, arming: bool = False) -> bool:
         """Whether what the mode needs is there."""
         if arming and not mode.value.allows_arming:
@@ -241,4 +284,4 @@ class Commander:
             return self._situation.offboard_alive
         if mode is Mode.MISSION:
             return self._situation.mission_ready
-        return mode.value.flies
+        return self._situation.sticks_alive or not mode.value.needs_sticks

@@ -23,6 +23,7 @@ class Cause(IntEnum):
     GEOFENCE = 5
     POSITION_LOST = 6
     ATTITUDE_FAILED = 7
+    STICKS_LOST = 8
 
 
 class Action(IntEnum):
@@ -65,7 +66,7 @@ _GCS_LOSS = {
     5: Action.TERMINATE,
     6: Action.DISARM,
 }
-"""NAV_DLL_ACT."""
+"""NAV_DLL_ACT; NAV_RCL_ACT has the same values."""
 _GEOFENCE = {
     1: Action.WARN,
     2: Action.HOLD,
@@ -74,8 +75,9 @@ _GEOFENCE = {
     5: Action.LAND,
 }
 """GF_ACTION."""
+HASTY_DELAY_S = 1.0
 _LATCHED = {Action.RTL, Action.LAND, Action.TERMINATE}
-_DELAYED = {Cause.GCS_LOST, Cause.BATTERY_CRITICAL, Cause.BATTERY_EMERGENCY}
+_DELAYED = {Cause.GCS_LOST, Cause.STICKS_LOST, Cause.BATTERY_CRITICAL, Cause.BATTERY_EMERGENCY}
 
 
 @dataclass
@@ -94,6 +96,8 @@ class Failsafes:
         self._parameters = parameters
         self._active: dict[Cause, _Active] = {}
         self._delay_until_s: float | None = None
+        self.delay_s = 0.0
+        """How long Return and Land wait in Hold."""
         self.action = Action.NONE
         """What is being done now."""
         self.delayed = Action.NONE
@@ -111,8 +115,15 @@ class Failsafes:
         for active in self._active.values():
             active.overruled = True
 
-    def update(self, failing: Mapping[Cause, bool], now_s: float) -> bool:
-        """Take in what fails; returns whether something worse is done than before."""
+    def update(self, failing: Mapping[Cause, bool], now_s: float, *, in_haste: bool = False) -> bool:
+        """Take in what fails; returns whether something worse is done than before.
+
+        Args:
+            failing: what fails now.
+            now_s: simulated time.
+            in_haste: the delay is short, because the pilot's mode cannot be flown any more.
+        """
+        self.delay_s = HASTY_DELAY_S if in_haste else self._parameters["COM_FAIL_ACT_T"]
         if not self._active and not any(failing.values()):
             self.action = self.delayed = Action.NONE
             return False
@@ -122,10 +133,6 @@ class Failsafes:
         before = self.action
         self.action, self.delayed = self._after_delay(wanted, now_s)
         return self.action > before and self.action > Action.NONE
-
-    @property
-    def delay_s(self) -> float:
-        return self._parameters["COM_FAIL_ACT_T"]
 
     def _update_cause(self, cause: Cause, fails: bool) -> None:
         active = self._active.get(cause)
@@ -158,6 +165,8 @@ class Failsafes:
                 return _OFFBOARD_LOSS.get(int(self._parameters["COM_OBL_RC_ACT"]), Action.DESCEND)
             case Cause.GCS_LOST:
                 return _GCS_LOSS.get(int(self._parameters["NAV_DLL_ACT"]), Action.NONE)
+            case Cause.STICKS_LOST:
+                return _GCS_LOSS.get(int(self._parameters["NAV_RCL_ACT"]), Action.NONE)
             case Cause.POSITION_LOST:
                 return Action.LAND_BLIND
             case Cause.ATTITUDE_FAILED:

@@ -138,12 +138,15 @@ class Land:
 
 
 class Descend:
-    """What is left of Position mode without sticks: stop, and sink at the landing speed."""
+    """What is left of a mode with sticks when they are gone: stop, and sink at the landing speed."""
 
     def __init__(self, craft: Craft) -> None:
         self._craft = craft
 
     def start(self, s: Snapshot, now_s: float) -> None:
+        if s.landed:
+            self._craft.control.idle()
+            return
         sink = (0.0, 0.0, self._craft.parameters["MPC_LAND_SPEED"])
         self._craft.control.track((NAN, NAN, NAN), sink, (NAN, NAN, NAN))
 

@@ -19,6 +19,18 @@ class Charge:
 
 
 @dataclass
+class SigningMemory:
+    """The key of the ground link, and what has been signed with it."""
+
+    key: bytes | None = None
+    """32 bytes; None does not sign."""
+    timestamp: int = 0
+    """The highest one that was sent or accepted."""
+    streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
+    """(system, component, link id) -> the last timestamp that was accepted."""
+
+
+@dataclass
 class Memory:
     """What PX4 has on its SD card, and the battery; the autopilot reads it at boot and writes it at every change."""
 
@@ -28,3 +40,4 @@ class Memory:
     fence: Plan = field(default_factory=Plan)
     rally: Plan = field(default_factory=Plan)
     charge: Charge = field(default_factory=Charge)
+    signing: SigningMemory = field(default_factory=SigningMemory)

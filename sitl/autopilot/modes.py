@@ -32,8 +32,7 @@ class ModeTraits:
     base_mode: int = CUSTOM | AUTO | GUIDED | STABILIZE
     standard_mode: int = 0
     """MAV_STANDARD_MODE."""
-    flies: bool = True
-    """False: it needs a pilot's sticks, or equipment, which this autopilot does not have."""
+    needs_sticks: bool = False
     allows_arming: bool = True
     needs_position: bool = True
     """False: it can be flown by a vehicle that does not know where it is, at least for a while."""
@@ -45,15 +44,17 @@ _STICKS = CUSTOM | MANUAL_INPUT | STABILIZE
 class Mode(Enum):
     """A flight mode."""
 
-    MANUAL = ModeTraits("Manual", MainMode.MANUAL, base_mode=_STICKS, flies=False, needs_position=False)
+    MANUAL = ModeTraits("Manual", MainMode.MANUAL, base_mode=_STICKS, needs_sticks=True, needs_position=False)
     ALTITUDE = ModeTraits(
-        "Altitude", MainMode.ALTITUDE, base_mode=_STICKS, standard_mode=4, flies=False, needs_position=False
+        "Altitude", MainMode.ALTITUDE, base_mode=_STICKS, standard_mode=4, needs_sticks=True, needs_position=False
     )
-    POSITION = ModeTraits("Position", MainMode.POSITION, base_mode=_STICKS, standard_mode=1, flies=False)
-    POSITION_SLOW = ModeTraits("Position Slow", MainMode.POSITION, 2, base_mode=_STICKS, flies=False)
+    POSITION = ModeTraits("Position", MainMode.POSITION, base_mode=_STICKS, standard_mode=1, needs_sticks=True)
+    POSITION_SLOW = ModeTraits("Position Slow", MainMode.POSITION, 2, base_mode=_STICKS, needs_sticks=True)
     ORBIT = ModeTraits("Orbit", MainMode.POSITION, 1, base_mode=_STICKS, standard_mode=2, allows_arming=False)
-    ACRO = ModeTraits("Acro", MainMode.ACRO, base_mode=CUSTOM | MANUAL_INPUT, flies=False, needs_position=False)
-    STABILIZED = ModeTraits("Stabilized", MainMode.STABILIZED, base_mode=_STICKS, flies=False, needs_position=False)
+    ACRO = ModeTraits("Acro", MainMode.ACRO, base_mode=CUSTOM | MANUAL_INPUT, needs_sticks=True, needs_position=False)
+    STABILIZED = ModeTraits(
+        "Stabilized", MainMode.STABILIZED, base_mode=_STICKS, needs_sticks=True, needs_position=False
+    )
     OFFBOARD = ModeTraits("Offboard", MainMode.OFFBOARD, base_mode=CUSTOM | STABILIZE, needs_position=False)
     TAKEOFF = ModeTraits("Takeoff", MainMode.AUTO, 2, standard_mode=8)
     HOLD = ModeTraits("Hold", MainMode.AUTO, 3)
@@ -67,6 +68,11 @@ class Mode(Enum):
     @property
     def custom_mode(self) -> int:
         return self.value.sub << 24 | self.value.main << 16
+
+    @property
+    def is_auto(self) -> bool:
+        """Whether the autopilot itself decides where to fly."""
+        return self.value.main is MainMode.AUTO or self is Mode.ORBIT
 
     @property
     def label(self) -> str:

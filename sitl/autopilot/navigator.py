@@ -14,6 +14,8 @@ from sitl.autopilot.orbit import Orbit, OrbitOrder
 from sitl.autopilot.places import LocalPoint
 from sitl.autopilot.plan import PLACES, Cmd, Plan, latitude_deg, longitude_deg
 from sitl.autopilot.reports import Severity
+from sitl.autopilot.stick_flight import AcroSticks, AltitudeSticks, PositionSticks, StabilizedSticks
+from sitl.autopilot.sticks import Sticks
 from sitl.dynamics.state import Guidance
 from sitl.snapshot import Snapshot
 
@@ -21,7 +23,9 @@ from sitl.snapshot import Snapshot
 class Navigator:
     """The flight modes of one vehicle."""
 
-    def __init__(self, craft: Craft, offboard: Offboard, fence: Geofence, on_reached: Callable[[int], None]) -> None:
+    def __init__(
+        self, craft: Craft, offboard: Offboard, sticks: Sticks, fence: Geofence, on_reached: Callable[[int], None]
+    ) -> None:
         self._craft = craft
         self._offboard = offboard
         self._fence = fence
@@ -35,9 +39,17 @@ class Navigator:
             Mode.ORBIT: self._orbit,
             Mode.LAND: Land(craft),
             Mode.RTL: Return(craft),
-            Mode.POSITION: Descend(craft),
+            Mode.POSITION: PositionSticks(craft, sticks),
+            Mode.POSITION_SLOW: PositionSticks(craft, sticks, speed="MC_SLOW_DEF_HVEL", turn="MC_SLOW_DEF_YAWR"),
+            Mode.ALTITUDE: AltitudeSticks(craft, sticks),
+            Mode.STABILIZED: StabilizedSticks(craft, sticks),
+            Mode.MANUAL: StabilizedSticks(craft, sticks),
+            Mode.ACRO: AcroSticks(craft, sticks),
         }
+        self._descend = Descend(craft)
+        self._sticks = sticks
         self._flown: Mode | None = None
+        self._flying: FlightMode | None = None
 
     # ----------------------------------------------------------------- orders
     def order_takeoff(self, altitude_amsl_m: float, yaw_rad: float) -> None:
@@ -107,11 +119,11 @@ class Navigator:
             return None
         if mode is Mode.MISSION:
             return self._fly_mission(s, now_s, entering)
-        flight_mode = self._modes.get(mode)
-        if flight_mode is None:  # a mode with sticks, which can only be chosen on the ground
-            self._craft.control.idle()
-            return None
-        if entering:
+        flight_mode = self._modes[mode]
+        if mode.value.needs_sticks and not self._sticks.is_alive(now_s):
+            flight_mode = self._descend
+        if entering or flight_mode is not self._flying:
+            self._flying = flight_mode
             flight_mode.start(s, now_s)
         if not flight_mode.update(s, now_s):
             return None

@@ -129,10 +129,36 @@ _SAFETY = (
 )
 
 
+_MANUAL = (
+    Parameter("COM_RC_IN_MODE", 1, 0, 4),
+    Parameter("COM_RC_LOSS_T", 0.5, 0.0, 35.0),
+    Parameter("COM_RC_OVERRIDE", 1, 0, 3),
+    Parameter("COM_RC_STICK_OV", 30.0, 5.0, 80.0),
+    Parameter("COM_RCL_EXCEPT", 0, 0, 31),
+    Parameter("NAV_RCL_ACT", 2, 0, 6),
+    Parameter("MPC_VEL_MANUAL", 10.0, 3.0, 20.0),
+    Parameter("MPC_JERK_MAX", 8.0, 0.5, 500.0),
+    Parameter("MPC_XY_MAN_EXPO", 0.6, 0.0, 1.0),
+    Parameter("MPC_Z_MAN_EXPO", 0.6, 0.0, 1.0),
+    Parameter("MPC_YAW_EXPO", 0.6, 0.0, 1.0),
+    Parameter("MPC_HOLD_DZ", 0.1, 0.0, 0.9),
+    Parameter("MPC_HOLD_MAX_XY", 0.8, 0.05, 3.0),
+    Parameter("MPC_HOLD_MAX_Z", 0.6, 0.05, 3.0),
+    Parameter("MPC_MAN_TILT_MAX", 35.0, 1.0, 70.0),
+    Parameter("MPC_MAN_Y_MAX", 150.0, 0.1, 400.0),
+    Parameter("MPC_MANTHR_MIN", 0.08, 0.0, 0.5),
+    Parameter("MC_ACRO_P_MAX", 100.0, 0.0, 1800.0),
+    Parameter("MC_ACRO_R_MAX", 100.0, 0.0, 1800.0),
+    Parameter("MC_ACRO_Y_MAX", 100.0, 0.0, 1800.0),
+    Parameter("MC_SLOW_DEF_HVEL", 3.0, 0.1, 20.0),
+    Parameter("MC_SLOW_DEF_YAWR", 45.0, 1.0, 400.0),
+)
+
+
 def parameter_table(airframe: Airframe) -> tuple[Parameter, ...]:
     """All parameters of one vehicle, sorted by name as their indices count."""
     own = (
         Parameter("MPC_THR_HOVER", round(airframe.hover_thrust, 3), 0.1, 0.8),
         Parameter("THR_MDL_FAC", airframe.thrust_curve, airframe.thrust_curve, airframe.thrust_curve),
     )
-    return tuple(sorted(_POSITION + _GUIDANCE + _TAKEOFF_AND_LANDING + _ATTITUDE + _SAFETY + own))
+    return tuple(sorted(_POSITION + _GUIDANCE + _TAKEOFF_AND_LANDING + _ATTITUDE + _SAFETY + _MANUAL + own))

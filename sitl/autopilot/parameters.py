@@ -11,7 +11,7 @@ MAV_PARAM_TYPE_UINT32 = 5
 MAV_PARAM_TYPE_INT32 = 6
 MAV_PARAM_TYPE_REAL32 = 9
 
-LOSS_TIMEOUTS = ("COM_OF_LOSS_T", "COM_DL_LOSS_T", "COM_OBC_LOSS_T")
+LOSS_TIMEOUTS = ("COM_OF_LOSS_T", "COM_DL_LOSS_T", "COM_OBC_LOSS_T", "COM_RC_LOSS_T")
 """Timeouts of the wall clock: with a speed factor they are longer in simulated time."""
 
 

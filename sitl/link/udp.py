@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from sitl.errors import PortInUse
 from sitl.fleet import TICK_S
+from sitl.link.parameter_files import ParameterFiles
 from sitl.link.truth_log import TruthLog
 from sitl.microservices.outbox import Link
 from sitl.settings import GCS_PORT, GROUND_PORT, Settings
@@ -130,7 +131,9 @@ def bind(host: str, port: int, purpose: str) -> socket.socket:
     return bound
 
 
-async def run(simulator: Simulator, links: FleetLinks, settings: Settings, log: TruthLog | None) -> None:
+async def run(
+    simulator: Simulator, links: FleetLinks, settings: Settings, log: TruthLog | None, files: ParameterFiles | None
+) -> None:
     """Advance the simulation at its speed for ever; collisions are reported on standard error."""
     loop = asyncio.get_running_loop()
     interval_s = TICK_S / settings.speed
@@ -141,6 +144,8 @@ async def run(simulator: Simulator, links: FleetLinks, settings: Settings, log: 
         links.send()
         if log is not None:
             log.write(simulator.truth)
+        if files is not None:
+            files.save(simulator.memories)
         for collision in simulator.collisions[reported:]:
             print(f"sitl: {collision}", file=sys.stderr, flush=True)
         reported = len(simulator.collisions)

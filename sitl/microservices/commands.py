@@ -223,7 +223,8 @@ def _send_available_modes(server: CommandServer, index: int, sender: Sender) -> 
     modes = list(Mode)
     for number, mode in enumerate(modes, start=1):
         if index in (0, number):
-            properties = 0 if mode.value.flies else mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+            selectable = mode is not Mode.TERMINATION
+            properties = 0 if selectable else mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
             message = mavlink.MAVLink_available_modes_message(
                 len(modes), number, mode.value.standard_mode, mode.custom_mode, properties, mode.label.encode()
             )

@@ -24,6 +24,8 @@ class Router:
         if sender.sysid == self._sysid and sender.compid == AUTOPILOT_COMPID:
             return False
         self._heard[sender.link].add((sender.sysid, sender.compid))
+        if message.get_type() == "SETUP_SIGNING":  # a key goes to whom it is for, and nowhere else
+            return False
         target = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
         if target == 0:

@@ -74,6 +74,12 @@ class GroundStation:
         self._socket.sendto(message.pack(self._codec), ("127.0.0.1", 18570 + self._base + sysid - 1))
         self._codec.seq = (self._codec.seq + 1) % 256
 
+    def sign(self, key: bytes) -> None:
+        """Sign from now on, on this machine's clock."""
+        signing = self._codec.signing
+        signing.secret_key, signing.sign_outgoing = key, True
+        signing.timestamp = (time.time_ns() // 1000 - 1_420_070_400_000_000) // 10
+
     def listen(self) -> list[Any]:
         """Take in what has arrived."""
         while True:

@@ -1,5 +1,6 @@
 """The `sitl` program: starts, says so, takes no port from others, and leaves nothing behind."""
 
+import hashlib
 import json
 import os
 import signal
@@ -83,6 +84,9 @@ def test_a_port_in_use_is_named(base):
         (("indoor", "--airframe", "zeppelin"), "--airframe"),
         (("indoor", "--fault", "lightning:vehicle=1"), "--fault lightning:vehicle=1: Invalid value 'lightning'"),
         (("indoor", "--fault", "reboot:vehicle=3"), "expected one of 1, 2, found 3"),
+        (("indoor", "--signing-key", "/no/such/keys"), "/no/such/keys"),
+        (("indoor", "--signing-key", __file__), "expected 64 hexadecimal digits"),
+        (("indoor", "--parameters", __file__), "File exists"),
         (("indoor", "--truth", "/no/such/folder/truth.csv"), "/no/such/folder/truth.csv"),
     ],
 )
@@ -163,3 +167,37 @@ def test_faults_are_ordered_while_it_runs(base, ground):
         ground.forget()
         ground.until(lambda: len(ground.of("ATTITUDE")) > 10)
         assert {m.get_srcSystem() for m in ground.heard} == {2}
+
+
+def test_parameters_outlast_the_simulator(base, ground, tmp_path):
+    arguments = ("--vehicles", "2", "--parameters", str(tmp_path))
+    with running_sitl(*arguments, base=base) as process:
+        ground.until(lambda: ground.last("HEARTBEAT", 2))
+        ground.send(mavlink.MAVLink_param_set_message(2, 1, b"MIS_TAKEOFF_ALT", 4.25, 9), sysid=2)
+        ground.until(lambda: ground.last("PARAM_VALUE", 2))
+        ground.until((tmp_path / "vehicle-2.params").exists)
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait(10.0)
+    ground.listen()
+    ground.forget()
+    with running_sitl(*arguments, base=base):
+        ground.until(lambda: ground.last("HEARTBEAT", 2))
+        for sysid in (1, 2):
+            ground.send(mavlink.MAVLink_param_request_read_message(sysid, 1, b"MIS_TAKEOFF_ALT", -1), sysid=sysid)
+        values = [ground.until(lambda i=i: ground.last("PARAM_VALUE", i)).param_value for i in (1, 2)]
+    assert values == [2.5, 4.25]
+
+
+def test_with_a_key_everything_for_the_ground_is_signed_and_the_unsigned_has_no_effect(base, ground, tmp_path):
+    key = bytes(range(32))
+    (tmp_path / "key").write_text(key.hex())
+    with running_sitl("--vehicles", "1", "--signing-key", str(tmp_path / "key"), base=base):
+        frame = ground.until(lambda: ground.last("HEARTBEAT")).get_msgbuf()
+        assert frame[-6:] == hashlib.sha256(key + frame[:-6]).digest()[:6]
+        check = mavlink.MAVLink_command_long_message(1, 1, 401, 0, *[0] * 7)
+        ground.send(check)
+        ground.until(lambda: len(ground.of("HEARTBEAT")) >= 3)
+        assert not ground.last("COMMAND_ACK")
+        ground.sign(key)
+        ground.send(check)
+        assert ground.until(lambda: ground.last("COMMAND_ACK")).result == 0

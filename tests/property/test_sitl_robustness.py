@@ -19,6 +19,7 @@ UNDERSTOOD = (
     "SET_POSITION_TARGET_LOCAL_NED",
     "SET_POSITION_TARGET_GLOBAL_INT",
     "SET_ATTITUDE_TARGET",
+    "MANUAL_CONTROL",
     "PARAM_REQUEST_LIST",
     "PARAM_REQUEST_READ",
     "PARAM_SET",
@@ -36,7 +37,7 @@ UNDERSTOOD = (
     "PING",
 )
 KINDS = {kind.msgname: kind for kind in mavlink.mavlink_map.values()}
-COMMANDS = (16, 20, 21, 22, 176, 178, 179, 185, 192, 246, 262, 300, 400, 410, 510, 511, 512, 520)
+COMMANDS = (16, 20, 21, 22, 34, 176, 178, 179, 185, 187, 192, 195, 197, 246, 262, 300, 400, 410, 510, 511, 512, 520)
 FLOATS = st.one_of(st.floats(width=32), st.sampled_from([0.0, 1.0, -1.0, 47.4, 8.5, 490.0, math.nan, math.inf, 1e38]))
 
 
@@ -96,7 +97,7 @@ def messages(draw):
         values = [draw(FLOATS) if code == "f" else value for code, value in zip(codes, values, strict=True)]
     names = dict(zip(kind.ordered_fieldnames, range(len(kind.ordered_fieldnames)), strict=True))
     if not any(kind.array_lengths):
-        for name, value in (("target_system", 1), ("target_component", 1)):
+        for name, value in (("target_system", 1), ("target_component", 1), ("target", 1)):
             if name in names:
                 values[names[name]] = value
         if "command" in names and kind.msgname != "MISSION_ITEM_INT":

@@ -53,6 +53,7 @@ class Flown:
         self._frames: dict[tuple[int, Link], list[bytes]] = {}
         self._codecs = {who: mavlink.MAVLink(None, *who) for who in (GCS, COMPANION)}
         self._setpoint: tuple[Any, int] | None = None
+        self._sticks: Any = None
         self.gcs_is_there = False
         """Whether a ground station sends its heartbeats, once a second."""
 
@@ -116,6 +117,8 @@ class Flown:
         for _ in range(round(duration_s / 0.02)):
             if self.gcs_is_there and round(self.time_s / 0.02) % 50 == 0:
                 self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+            if self._sticks is not None:
+                self.send(self._sticks)
             if self._setpoint is not None:
                 message, sysid = self._setpoint
                 self.send(message, sysid=sysid, link=Link.ONBOARD)
@@ -201,6 +204,16 @@ class Flown:
     def go_silent(self) -> "Flown":
         """Stop sending setpoints."""
         self._setpoint = None
+        return self
+
+    def hold_sticks(self, *, pitch: int = 0, roll: int = 0, throttle: int = 500, yaw: int = 0) -> "Flown":
+        """Send these sticks at every tick from now on, as MANUAL_CONTROL has them."""
+        self._sticks = mavlink.MAVLink_manual_control_message(1, pitch, roll, throttle, yaw, 0)
+        return self
+
+    def let_go(self) -> "Flown":
+        """Stop sending sticks."""
+        self._sticks = None
         return self
 
     def offboard(self) -> "Flown":
