@@ -19,6 +19,10 @@ LOCKDOWN_S = 5.0
 """A terminated flight is disarmed after this long."""
 
 
+STICKS_AFTER_OFFBOARD = {1: Mode.ALTITUDE, 2: Mode.STABILIZED}
+"""COM_OBL_RC_ACT: what a pilot with sticks flies when Offboard is lost; Position otherwise."""
+
+
 class BatteryWarning(Enum):
     """How empty the battery is."""
 
@@ -87,6 +91,8 @@ class Commander:
         if action <= Action.WARN:
             return self._without_position(self.intended)
         mode = MODE_OF_ACTION.get(action, self.intended)
+        if action is Action.DESCEND and self._situation.sticks_alive:
+            mode = STICKS_AFTER_OFFBOARD.get(int(self._parameters["COM_OBL_RC_ACT"]), mode)
         return mode if self._situation.position_valid or not mode.value.needs_position else Mode.LAND
 
     @property
@@ -98,7 +104,10 @@ class Commander:
         """Whether the selected mode may be armed."""
         s = self._situation
         intact = self._terminated_s is None and not s.crashed
-        return self._booted and intact and not s.fence_breached and self._may_run(self.intended, arming=True)
+        charged = s.battery.value < BatteryWarning.CRITICAL.value
+        return (
+            self._booted and intact and charged and not s.fence_breached and self._may_run(self.intended, arming=True)
+        )
 
     @property
     def system_status(self) -> SystemStatus:

@@ -86,9 +86,7 @@ def _terminate(server: CommandServer, command: Command, sender: Sender) -> Resul
 
 # -------------------------------------------------------------------- flight
 def _reposition(server: CommandServer, command: Command, sender: Sender) -> Result:
-    """Only with the bit that switches to Hold; the altitude is AMSL whatever the frame."""
-    if _number(command.params[1]) != 1:
-        return Result.UNSUPPORTED
+    """The altitude is AMSL whatever the frame; without the bit that switches to Hold it counts only for who holds."""
     autopilot = server.autopilot
     frame, (latitude_deg, longitude_deg) = autopilot.craft.frame, command.place
     z_m = frame.origin.altitude_m - command.params[6]
@@ -97,7 +95,10 @@ def _reposition(server: CommandServer, command: Command, sender: Sender) -> Resu
         target = frame.local(latitude_deg, longitude_deg, command.params[6])
     elif not (math.isnan(latitude_deg) and math.isnan(longitude_deg)):
         return Result.DENIED
-    result = autopilot.request_mode(Mode.HOLD)
+    switches = _number(command.params[1]) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    if not switches and autopilot.mode is not Mode.HOLD:
+        return Result.ACCEPTED
+    result = autopilot.request_mode(Mode.HOLD) if switches else Result.ACCEPTED
     if result is not Result.ACCEPTED:
         return result
     if command.params[0] > 0.0:

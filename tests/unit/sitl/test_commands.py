@@ -27,7 +27,7 @@ ON_THE_GROUND = [
     (179, (0, 0, 0, 0, NAN, 8.5, 480.0), DENIED),
     (185, (0,), DENIED),
     (192, (-1, 1, 0, NAN, 47.9, 8.5, 500.0), ACCEPTED),
-    (192, (-1, 0, 0, NAN, 47.9, 8.5, 500.0), UNSUPPORTED),
+    (192, (-1, 0, 0, NAN, 47.9, 8.5, 500.0), ACCEPTED),
     (192, (-1, 1, 0, NAN, 147.9, 8.5, 500.0), DENIED),
     (246, (0,), ACCEPTED),
     (246, (1,), ACCEPTED),
@@ -106,6 +106,16 @@ def test_command_int_repositions_take_amsl_in_every_frame(frame):
     flown.run(10.0)
     assert flown.last("COMMAND_ACK").result == ACCEPTED
     assert np.allclose(flown.position, [0.0, 3.0, 6.0], atol=0.15)
+
+
+@pytest.mark.parametrize(("mode", "north_m"), [((4, 3), 6.0), ((4, 5), 0.0)])
+def test_a_reposition_that_switches_no_mode_counts_only_in_hold(mode, north_m):
+    flown = Flown().take_off(4.0)
+    flown.command(176, 1, *mode)
+    x, y = place(6.0, 0.0)
+    assert flown.command(192, -1, 0, 0, NAN, x * 1e-7, y * 1e-7, 489.4 + 4.0) == ACCEPTED
+    flown.run(8.0)
+    assert flown.position[1] == pytest.approx(north_m, abs=0.2)
 
 
 def test_numbers_left_out_keep_what_there_is_and_nothing_at_all_is_a_pause():

@@ -192,6 +192,13 @@ def test_a_failed_battery_is_not_full_again_after_a_landing_or_a_reboot():
 
 
 # ------------------------------------------------------- noise, weather, reboot
+@pytest.mark.parametrize(("remaining", "result"), [(0.24, 0), (0.1, 0), (0.06, 1)])
+def test_nobody_arms_on_a_critical_battery(remaining, result):
+    flown = Flown().boot()
+    flown.simulator.order(BatteryLevel(remaining=remaining))
+    assert flown.run(0.1).command(400, 1) == result
+
+
 def test_noise_makes_the_estimate_wander():
     flown = Flown().take_off(5.0)
     flown.simulator.order(SensorNoise(horizontal_std_m=0.5, vertical_std_m=0.1, velocity_std_m_s=0.1))

@@ -218,13 +218,15 @@ def test_what_is_done_about_missing_sticks_is_a_parameter(action, mode):
     assert flown.let_go().run(2.5).mode == mode
 
 
-def test_sticks_are_what_offboard_falls_back_to():
+@pytest.mark.parametrize(("setting", "mode"), [(0, "POSITION"), (1, "ALTITUDE"), (2, "STABILIZED")])
+def test_sticks_are_what_offboard_falls_back_to(setting, mode):
     flown = Flown().take_off(5.0)
+    flown.set_parameter("COM_OBL_RC_ACT", setting)
     flown.stream(position=(0.0, 0.0, -5.0)).offboard()
     flown.hold_sticks().run(0.5)
     flown.go_silent().run(4.0)
-    assert flown.mode == "POSITION"
-    assert flown.height == pytest.approx(5.0, abs=0.3)
+    assert flown.mode == mode
+    assert flown.height == pytest.approx(5.0, abs=0.5)
 
 
 def test_a_pilot_goes_on_by_altitude_when_the_position_is_lost():
