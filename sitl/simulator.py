@@ -175,8 +175,9 @@ class Simulator:
         self._faults.tick(now_s, self._since_takeoff_s)
         for sysid, snapshot in zip(self.vehicles, snapshots, strict=True):
             for link, way_in in self._links[sysid].items():
-                for datagram in way_in.arrived(Direction.UP, now_s):
-                    self._deliver(sysid, link, datagram)
+                if not way_in.is_perfect(now_s):
+                    for datagram in way_in.arrived(Direction.UP, now_s):
+                        self._deliver(sysid, link, datagram)
             if self._first_takeoff_s is None and not snapshot.grounded:
                 self._first_takeoff_s = now_s
             if snapshot.crash != self._known_crashes[sysid]:
@@ -208,15 +209,14 @@ class Simulator:
     def _collect(self, sysid: int) -> None:
         """Move what a vehicle has sent to the outside, through the faults of its links."""
         now_s, links, vehicle = self.time_s, self._links[sysid], self.vehicles[sysid]
-        perfect = {link: way_out.is_perfect(now_s) for link, way_out in links.items()}
+        faulty = [link for link, way_out in links.items() if not way_out.is_perfect(now_s)]
         for link, frame in vehicle.take():
-            if perfect[link]:
-                self._out.append((sysid, link, frame))
-            else:
+            if link in faulty:
                 links[link].send(Direction.DOWN, frame, now_s, self._since_takeoff_s)
-        for link, way_out in links.items():
-            if not perfect[link]:
-                self._out.extend((sysid, link, frame) for frame in way_out.arrived(Direction.DOWN, now_s))
+            else:
+                self._out.append((sysid, link, frame))
+        for link in faulty:
+            self._out.extend((sysid, link, frame) for frame in links[link].arrived(Direction.DOWN, now_s))
         if vehicle.autopilot.reboot_ordered and sysid not in self._asleep_until_s:
             self._reboot(sysid)
 

@@ -104,7 +104,7 @@ class Autopilot:
         return self._mission_problem is None
 
     # --------------------------------------------------------------- requests
-    def situation(self) -> Situation:
+    def situation(self, *, sticks_moved: bool = False) -> Situation:
         s = self.snapshot
         return Situation(
             landed=bool(s.landed),
@@ -119,6 +119,7 @@ class Autopilot:
             position_valid=self.craft.position_valid,
             attitude_failed=self.failure_detector.attitude_failed,
             sticks_alive=self.sticks.is_alive(self._now_s),
+            sticks_moved=sticks_moved,
             throttle=self.sticks.throttle,
         )
 
@@ -185,7 +186,7 @@ class Autopilot:
             self._next_fence_s = now_s + FENCE_CHECK_S
             self._check_fence(s)
         self._announce_landing(bool(s.landed))
-        self.commander.observe(self.situation()._replace(sticks_moved=self.sticks.take_movement()), now_s)
+        self.commander.observe(self.situation(sticks_moved=self.sticks.take_movement()), now_s)
         self.commander.update()
         if not self.home_known and now_s >= HOME_SET_S:
             self.set_home()

@@ -23,6 +23,10 @@ STICKS_AFTER_OFFBOARD = {1: Mode.ALTITUDE, 2: Mode.STABILIZED}
 """COM_OBL_RC_ACT: what a pilot with sticks flies when Offboard is lost; Position otherwise."""
 
 
+STICKS_EXCEPTED = {Mode.MISSION: 1, Mode.HOLD: 2, Mode.TAKEOFF: 2, Mode.OFFBOARD: 4}
+"""Mode -> its bit in COM_RCL_EXCEPT."""
+
+
 class BatteryWarning(Enum):
     """How empty the battery is."""
 
@@ -217,18 +221,21 @@ class Commander:
     def _let_pilot_take_over(self) -> None:
         """Sticks that move end an auto mode (COM_RC_OVERRIDE bit 0) or Offboard (bit 1)."""
         s, allowed = self._situation, int(self._parameters["COM_RC_OVERRIDE"])
-        overridable = (allowed & 1 and self.mode.is_auto) or (allowed & 2 and self.mode is Mode.OFFBOARD)
-        if s.sticks_alive and s.sticks_moved and overridable:
+        if not s.sticks_alive or not s.sticks_moved:
+            return
+        if (allowed & 1 and self.mode.is_auto) or (allowed & 2 and self.mode is Mode.OFFBOARD):
             self._say(Severity.INFO, "Pilot took over using sticks")
             self._failsafes.mode_changed()
             self._intend(Mode.POSITION if s.position_valid else Mode.ALTITUDE)
 
     def _misses_sticks(self) -> bool:
         """Whether a pilot's sticks are gone, where COM_RCL_EXCEPT does not do without them."""
-        self._sticks_expected = self._sticks_expected or self._situation.sticks_alive
-        bit = {Mode.MISSION: 1, Mode.HOLD: 2, Mode.TAKEOFF: 2, Mode.OFFBOARD: 4}.get(self.intended, 0)
-        excepted = int(self._parameters["COM_RCL_EXCEPT"]) & bit or self.intended is Mode.LAND
-        return self._sticks_expected and not self._situation.sticks_alive and not excepted
+        if self._situation.sticks_alive:
+            self._sticks_expected = True
+        if self._situation.sticks_alive or not self._sticks_expected:
+            return False
+        excepted = int(self._parameters["COM_RCL_EXCEPT"]) & STICKS_EXCEPTED.get(self.intended, 0)
+        return not excepted and self.intended is not Mode.LAND
 
     def _throttle_is_up(self) -> bool:
         """Whether the motors would spin up, or the vehicle climb, as soon as it is armed."""
@@ -280,8 +287,9 @@ class Commander:
     def _without_position(self, mode: Mode) -> Mode:
         """A pilot who flies by position goes on by altitude where that gets lost."""
         s = self._situation
-        by_position = mode in (Mode.POSITION, Mode.POSITION_SLOW)
-        return Mode.ALTITUDE if by_position and s.sticks_alive and not s.position_valid else mode
+        if s.position_valid or not s.sticks_alive:
+            return mode
+        return Mode.ALTITUDE if mode in (Mode.POSITION, Mode.POSITION_SLOW) else mode
 
     def _may_run(self, mode: Mode, *, arming: bool = False) -> bool:
         """Whether what the mode needs is there."""

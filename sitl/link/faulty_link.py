@@ -40,6 +40,7 @@ class FaultyLink:
         self._flying: dict[Direction, list[tuple[float, int, bytes]]] = {way: [] for way in Direction}
         self._free_s: dict[Direction, float] = {}
         """When a narrow link has sent what waits for it."""
+        self._n_flying = 0
         self._latest_s = dict.fromkeys(Direction, -math.inf)
         """When the last datagram arrives that others do not overtake."""
         self._order = itertools.count()
@@ -60,7 +61,7 @@ class FaultyLink:
 
     def is_perfect(self, now_s: float) -> bool:
         """Whether datagrams may pass by this object: no faults, and nothing is on its way that they would overtake."""
-        return self._is_plain and now_s >= self._black_until_s and not any(self._flying.values())
+        return self._n_flying == 0 and self._is_plain and now_s >= self._black_until_s
 
     def send(self, way: Direction, datagram: bytes, now_s: float, since_takeoff_s: float | None) -> None:
         """Put a datagram on its way.
@@ -84,16 +85,21 @@ class FaultyLink:
             arrival_s = self._latest_s[way] = max(arrival_s, self._latest_s[way])
         if self._happens(c.reorder):
             arrival_s += HELD_BACK_S
-        heapq.heappush(self._flying[way], (arrival_s, next(self._order), datagram))
+        self._push(way, arrival_s, datagram)
         if self._happens(c.duplicates):
-            heapq.heappush(self._flying[way], (arrival_s + HELD_BACK_S, next(self._order), datagram))
+            self._push(way, arrival_s + HELD_BACK_S, datagram)
 
     def arrived(self, way: Direction, now_s: float) -> list[bytes]:
         """The datagrams that have arrived by now, in the order of their arrival."""
         queue, out = self._flying[way], []
         while queue and queue[0][0] <= now_s:
             out.append(heapq.heappop(queue)[2])
+        self._n_flying -= len(out)
         return out
+
+    def _push(self, way: Direction, arrival_s: float, datagram: bytes) -> None:
+        heapq.heappush(self._flying[way], (arrival_s, next(self._order), datagram))
+        self._n_flying += 1
 
     def _departure_s(self, way: Direction, n_bytes: int, now_s: float) -> float | None:
         """When a datagram has got through the bottleneck; None if it found no room to wait."""
