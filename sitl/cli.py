@@ -23,7 +23,14 @@ from sitl.errors import BadPlace, SitlError
 from sitl.link.parameter_files import ParameterFiles
 from sitl.open_field import open_field
 from sitl.service import serve
-from sitl.settings import COMPANION_PORT, HIGHEST_INSTANCE_BASE, HIGHEST_ONBOARD_PORT, ONBOARD_PORT, Settings
+from sitl.settings import (
+    COMPANION_PORT,
+    HIGHEST_INSTANCE_BASE,
+    HIGHEST_INSTANCE_BASE_WITH_LIDAR,
+    HIGHEST_ONBOARD_PORT,
+    ONBOARD_PORT,
+    Settings,
+)
 from sitl.signing_keys import load_signing_keys
 from sitl.simulator import Simulator
 
@@ -62,6 +69,9 @@ def fly(
     parameters: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Keep parameters here from one simulation to the next.")
     ] = None,
+    lidar: Annotated[
+        bool, typer.Option("--lidar", help="Send the companions what the mission's range sensor sees.")
+    ] = False,
     supervised: Annotated[bool, typer.Option("--supervised", help="End when standard input does.")] = False,
 ) -> None:
     """Simulate the vehicles of a mission, each an autopilot with PX4's manners on two UDP ports.
@@ -73,6 +83,9 @@ def fly(
     if (mission is None) == (vehicles is None):
         raise typer.BadParameter("expected a MISSION or --vehicles, one of the two")
     onboard_port, companion_port = _ports(onboard_ports)
+    if lidar and instance_base > HIGHEST_INSTANCE_BASE_WITH_LIDAR:
+        highest = HIGHEST_INSTANCE_BASE_WITH_LIDAR
+        raise typer.BadParameter(f"--instance-base: expected at most {highest} with --lidar, found {instance_base}")
     try:
         settings = Settings(
             speed=speed,
@@ -85,6 +98,7 @@ def fly(
             faults=tuple(parse_simulator_fault(text) for text in fault or ()),
             signing_key=signing_key,
             parameters=parameters,
+            lidar=lidar,
             supervised=supervised,
         )
         flown = _mission(mission, vehicles, origin)
@@ -105,7 +119,7 @@ def main() -> None:
 def warm_simulator(mission: Mission, settings: Settings, memories: dict[int, Memory]) -> Simulator:
     """A simulator whose compiled code is there, so that its first step takes no longer than the others."""
     with _announced("sitl: compiling the physics, on a machine's first run only"), one_at_a_time("sitl"):
-        rehearsal = Simulator(mission, seed=settings.seed, airframe=settings.airframe.airframe)
+        rehearsal = Simulator(mission, seed=settings.seed, airframe=settings.airframe.airframe, lidar=settings.lidar)
         rehearsal.step()
     now_us = time.time_ns() // 1000
     simulator = Simulator(
@@ -113,6 +127,7 @@ def warm_simulator(mission: Mission, settings: Settings, memories: dict[int, Mem
         seed=settings.seed,
         speed=settings.speed,
         airframe=settings.airframe.airframe,
+        lidar=settings.lidar,
         utc_start_us=now_us,
         memories=memories,
     )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from missions.faults import SimulatorFault
+from missions.lidar_packets import FIRST_PORT
 from sitl.dynamics.airframe import AirframeName
 
 GROUND_PORT, GCS_PORT = 18570, 14550
@@ -11,6 +12,7 @@ ONBOARD_PORT, COMPANION_PORT = 14580, 14540
 CONTROL_PORT = 14990
 """Where faults are ordered at run time."""
 HIGHEST_INSTANCE_BASE = 65535 - GROUND_PORT - 250
+HIGHEST_INSTANCE_BASE_WITH_LIDAR = 65535 - FIRST_PORT - 250
 HIGHEST_ONBOARD_PORT = GROUND_PORT - 250
 """As far as any instance base leaves room for 250 vehicles."""
 
@@ -37,6 +39,8 @@ class Settings:
     """File with the keys of the ground links."""
     parameters: Path | None = None
     """Folder in which parameters outlast the simulation."""
+    lidar: bool = False
+    """Whether the companions get the packets of the mission's range sensor."""
     supervised: bool = False
     """End when standard input does."""
     host: str = "127.0.0.1"

@@ -19,7 +19,9 @@ from sitl.fault_injection import Breakable, FaultInjector
 from sitl.fleet import TICK_S, Fleet
 from sitl.link.faulty_link import Direction, FaultyLink
 from sitl.microservices.outbox import Link
+from sitl.microservices.telemetry import Surroundings
 from sitl.open_field import open_field
+from sitl.sensors.lidar import PacketStream, RangeSensors
 from sitl.snapshot import Snapshot
 from sitl.vehicle import Vehicle
 
@@ -74,6 +76,7 @@ class Simulator:
         airframe: the body of every vehicle.
         utc_start_us: UTC at boot.
         memories: system id -> what a vehicle has kept from earlier runs.
+        lidar: whether the vehicles carry the mission's range sensor; it costs more than everything else.
 
     Raises:
         MissionError: one of the mission's faults names a vehicle that is not there.
@@ -95,6 +98,7 @@ class Simulator:
         airframe: Airframe = X500_LIKE,
         utc_start_us: int = UTC_START_US,
         memories: Mapping[int, Memory] | None = None,
+        lidar: bool = False,
     ) -> None:
         mission = open_field(mission) if isinstance(mission, int) else mission
         self.mission = mission
@@ -104,11 +108,14 @@ class Simulator:
             np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(1 + 2 * n)
         )
         self._fleet = Fleet(mission, airframe, physics_rng)
+        self._range_sensors = RangeSensors(mission, np.random.default_rng([seed, *b"lidar"])) if lidar else None
+        self._lidar_out: list[tuple[int, bytes]] = []
         self._ticks = 0
         self._first_takeoff_s: float | None = None
         self._out: list[tuple[int, Link, bytes]] = []
         self.collisions: list[Collision] = []
         self._index = {vehicle.sysid: index for index, vehicle in enumerate(mission.vehicles)}
+        self._lidar_streams = {sysid: PacketStream() for sysid in self._index}
         self._known_crashes = dict.fromkeys(self._index, float(Crash.NONE))
         self._memories = {sysid: (memories or {}).get(sysid) or Memory() for sysid in self._index}
         self._booted_s = dict.fromkeys(self._index, 0.0)
@@ -173,6 +180,7 @@ class Simulator:
         self._ticks += 1
         now_s = self.time_s
         self._faults.tick(now_s, self._since_takeoff_s)
+        self._look_around()
         for sysid, snapshot in zip(self.vehicles, snapshots, strict=True):
             for link, way_in in self._links[sysid].items():
                 if not way_in.is_perfect(now_s):
@@ -190,6 +198,23 @@ class Simulator:
         """What the vehicles have sent since the last call: (system id, link, one frame), in order."""
         out, self._out = self._out, []
         return out
+
+    def lidar_datagrams(self) -> list[tuple[int, bytes]]:
+        """What the lidars have sent since the last call: (system id, one datagram), in order."""
+        out, self._lidar_out = self._lidar_out, []
+        return out
+
+    def _look_around(self) -> None:
+        """Let the range sensors scan, if there are any and it is time."""
+        sensors, now_s = self._range_sensors, self.time_s
+        if sensors is None or not sensors.is_due(now_s):
+            return
+        truth = self.truth
+        clocks_s = np.array([now_s - booted_s for booted_s in self._booted_s.values()])
+        scans = sensors.scan(now_s, truth.position_enu_m, truth.attitude_ned_frd, clocks_s)
+        for sysid, scan in zip(self._index, scans, strict=True):
+            self.vehicles[sysid].surroundings = Surroundings(scan.time_s, scan.distances_m, self.mission.sensor.range_m)
+            self._lidar_out.extend((sysid, datagram) for datagram in self._lidar_streams[sysid].datagrams(scan))
 
     @property
     def _since_takeoff_s(self) -> float | None:

@@ -27,7 +27,7 @@ from sitl.microservices.setpoint_server import SetpointServer
 from sitl.microservices.signing import Signing
 from sitl.microservices.statustext import StatusTexts
 from sitl.microservices.streams import Streams
-from sitl.microservices.telemetry import Moment
+from sitl.microservices.telemetry import Moment, Surroundings
 from sitl.snapshot import Snapshot, is_broken
 from sitl.wire import FrameReader
 
@@ -86,6 +86,8 @@ class Vehicle:
         self._router = Router(sysid)
         self._signing = Signing(memory.signing, wall_start_us, speed)
         self._streams = {link: Streams(link, self.outbox, TICK_S) for link in Link}
+        self.surroundings: Surroundings | None = None
+        """What the range sensor has seen last, for OBSTACLE_DISTANCE; None without such a sensor."""
         self._make_services(speed)
         self.autopilot.tick(first_view, 0.0, 0.0)
         self.autopilot.remember()
@@ -198,7 +200,9 @@ class Vehicle:
 
     def _moment(self) -> Moment:
         utc_us = self._utc_start_us + round(self._now_s * 1e6)
-        return Moment(self.autopilot, self._snapshot, self._now_s, utc_us, self._positioning, self.sysid)
+        return Moment(
+            self.autopilot, self._snapshot, self._now_s, utc_us, self._positioning, self.sysid, self.surroundings
+        )
 
 
 def _own_frame(body: np.void) -> OwnFrame:

@@ -1,11 +1,13 @@
 """The sockets of a fleet: two UDP ports per vehicle, one MAVLink message per datagram, paced by the loop's clock."""
 
 import asyncio
+import contextlib
 import errno
 import socket
 import sys
 from typing import NamedTuple
 
+from missions.lidar_packets import FIRST_PORT
 from sitl.errors import PortInUse
 from sitl.fleet import TICK_S
 from sitl.link.parameter_files import ParameterFiles
@@ -47,6 +49,7 @@ class FleetLinks:
         self._settings = settings
         self._ends: dict[bool, dict[int, End]] = {True: {}, False: {}}
         """Is it the ground link -> system id -> socket and peer."""
+        self._lidar: socket.socket | None = None
 
     def open(self) -> None:
         """Bind all ports, and receive on them in the running event loop.
@@ -55,6 +58,8 @@ class FleetLinks:
             PortInUse: naming the port.
         """
         try:
+            self._lidar = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._lidar.setblocking(False)
             for port in self._ports():
                 self._open_one(port)
         except BaseException:
@@ -72,8 +77,19 @@ class FleetLinks:
                 end.sendto(frame, peer)
             except OSError:
                 pass
+        if self._lidar is not None:
+            self._send_lidar(self._lidar)
+
+    def _send_lidar(self, end: socket.socket) -> None:
+        first = FIRST_PORT + self._settings.instance_base
+        for sysid, datagram in self._simulator.lidar_datagrams():
+            with contextlib.suppress(OSError):
+                end.sendto(datagram, (self._settings.host, first + sysid - 1))
 
     def close(self) -> None:
+        if self._lidar is not None:
+            self._lidar.close()
+            self._lidar = None
         for ends in self._ends.values():
             for end, _ in ends.values():
                 asyncio.get_running_loop().remove_reader(end)

@@ -49,6 +49,8 @@ STREAMS = (
     Stream("PING", telemetry.ping, 0.1, 1.0),
     Stream("GPS_GLOBAL_ORIGIN", telemetry.gps_global_origin, 0.0, 0.0),
     Stream("AUTOPILOT_VERSION", telemetry.autopilot_version, 0.0, 0.0),
+    Stream("OBSTACLE_DISTANCE", telemetry.obstacle_distance, 0.0, 10.0),
+    Stream("UTM_GLOBAL_POSITION", telemetry.utm_global_position, 0.0, 0.0),
 )
 BY_ID = {LAYOUTS[stream.name].message_id: stream for stream in STREAMS}
 """Message id -> stream."""

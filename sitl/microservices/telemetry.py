@@ -24,6 +24,21 @@ SENSORS_PRESENT, SENSORS_ENABLED = 0x0300402D, 0x0301402D
 SENSORS_HEALTHY = 0x2320C83F
 PREARM_BIT = 0x10000000
 MISSION_NONE = 65535
+NEAREST_CM = 10
+"""OBSTACLE_DISTANCE's min_distance."""
+UTM_AVAILABLE = 0b0111_1111
+"""UTM_DATA_AVAIL_FLAGS: everything but the next waypoint."""
+
+
+class Surroundings(NamedTuple):
+    """What a vehicle's range sensor has seen around it."""
+
+    time_s: float
+    """Of the vehicle's clock."""
+    distances_m: tuple[float, ...]
+    """In equal sectors clockwise from ahead; infinite for nothing, NaN for unseen."""
+    range_m: float
+    """How far it sees."""
 
 
 class Moment(NamedTuple):
@@ -36,6 +51,8 @@ class Moment(NamedTuple):
     """UTC of now: the simulation's start plus simulated time."""
     positioning: Positioning
     sysid: int
+    surroundings: Surroundings | None = None
+    """None without a range sensor."""
 
     @property
     def time_boot_ms(self) -> int:
@@ -239,6 +256,37 @@ def estimator_status(m: Moment) -> tuple:
 
 def vibration(m: Moment) -> tuple:
     return m.time_us, 0.0, 0.0, 0.0, 0, 0, 0
+
+
+def obstacle_distance(m: Moment) -> tuple | None:
+    """What the range sensor sees around, in the body's frame."""
+    if m.surroundings is None:
+        return None
+    time_s, distances_m, range_m = m.surroundings
+    farthest_cm = round(min(range_m * 100.0, 65533.0))
+    distances = tuple(_sector_cm(distance_m, farthest_cm) for distance_m in distances_m)
+    width_deg = 360 // len(distances)
+    kind, frame = mavlink.MAV_DISTANCE_SENSOR_LASER, mavlink.MAV_FRAME_BODY_FRD
+    return round(time_s * 1e6), kind, distances, width_deg, NEAREST_CM, farthest_cm, 0.0, 0.0, frame
+
+
+def _sector_cm(distance_m: float, farthest_cm: int) -> int:
+    """OBSTACLE_DISTANCE's: one more than the farthest is free, 65535 unknown."""
+    if math.isnan(distance_m):
+        return 65535
+    return farthest_cm + 1 if math.isinf(distance_m) else min(round(distance_m * 100.0), farthest_cm)
+
+
+def utm_global_position(m: Moment) -> tuple:
+    """For everybody else in the air; the id is the system's."""
+    s = m.s
+    across, up = (round(std * 1e3) for std in (m.positioning.horizontal_std_m, m.positioning.vertical_std_m))
+    uas_id = (m.sysid,) + (0,) * 17
+    place = _e7(s.latitude_deg), _e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
+    velocity = round(s.vx_m_s * 100.0), round(s.vy_m_s * 100.0), round(s.vz_m_s * 100.0)
+    accuracy = min(across, 65535), min(up, 65535), min(round(m.positioning.velocity_std_m_s * 100.0), 65535)
+    state = mavlink.UTM_FLIGHT_STATE_AIRBORNE if not m.s.landed else mavlink.UTM_FLIGHT_STATE_GROUND
+    return m.utc_us, uas_id, *place, *velocity, *accuracy, 0, 0, 0, 0, state, UTM_AVAILABLE
 
 
 # ------------------------------------------------------------- setpoints

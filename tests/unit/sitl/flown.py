@@ -47,9 +47,15 @@ class Flown:
     """One simulator, seen from the ground link and the onboard link of its first vehicle."""
 
     def __init__(
-        self, mission: Mission | None = None, *, seed: int = 1, speed: float = 1.0, airframe: Airframe = X500_LIKE
+        self,
+        mission: Mission | None = None,
+        *,
+        seed: int = 1,
+        speed: float = 1.0,
+        airframe: Airframe = X500_LIKE,
+        lidar: bool = False,
     ) -> None:
-        self.simulator = Simulator(mission or field(), seed=seed, speed=speed, airframe=airframe)
+        self.simulator = Simulator(mission or field(), seed=seed, speed=speed, airframe=airframe, lidar=lidar)
         self._frames: dict[tuple[int, Link], list[bytes]] = {}
         self._codecs = {who: mavlink.MAVLink(None, *who) for who in (GCS, COMPANION)}
         self._setpoint: tuple[Any, int] | None = None
