@@ -26,13 +26,14 @@ MISSION = f"""QGC WPL 110
 FENCE = """QGC WPL 110
 0\t0\t3\t5001\t4\t0\t0\t0\t47.3976\t8.5453\t0\t1
 1\t0\t3\t5001\t4\t0\t0\t0\t47.3976\t8.5459\t0\t1
-2\t0\t3\t5001\t4\t0\t0\t0\t47.3979\t8.5459\t0\t1
-3\t0\t3\t5001\t4\t0\t0\t0\t47.3979\t8.5453\t0\t1
+2\t0\t3\t5001\t4\t0\t0\t0\t47.3985\t8.5459\t0\t1
+3\t0\t3\t5001\t4\t0\t0\t0\t47.3985\t8.5453\t0\t1
 """
 RALLY = f"QGC WPL 110\n0\t0\t3\t5100\t0\t0\t0\t0\t{NORTH_10_M}\t10\t1\n"
 SETPOINT = "repeat add 0.1 message SET_POSITION_TARGET_LOCAL_NED 0 1 1 1"
 HOLD, OFFBOARD, LAND = "long DO_SET_MODE 1 4 3", "long DO_SET_MODE 1 6", "long NAV_LAND"
 IN_HOLD, IN_OFFBOARD, IN_RTL, IN_LAND = 0x03040000, 0x00060000, 0x05040000, 0x06040000
+IN_POSITION = 0x00030000
 
 
 @pytest.fixture(scope="module")
@@ -166,9 +167,22 @@ def test_setpoints_that_stop_are_a_failsafe(mavproxy):
     set_parameter(mavproxy, "COM_OBL_RC_ACT", 0)
 
 
+def test_sticks_fly_position_control(mavproxy):
+    take_off(mavproxy)
+    mavproxy.type("repeat add 0.05 message MANUAL_CONTROL 1 500 0 500 0 0")
+    deadline_s = time.monotonic() + 10.0
+    while mavproxy.ask("long DO_SET_MODE 1 3", r"DO_SET_MODE: (\w+)")[1] != "ACCEPTED":
+        assert time.monotonic() < deadline_s, "Position is still refused"
+        time.sleep(0.1)
+    in_mode(mavproxy, IN_POSITION)
+    mavproxy.until("VFR_HUD", "groundspeed", 1.0, 5.0)
+    mavproxy.type("repeat clean")
+    mavproxy.ask(HOLD, r"DO_SET_MODE: ACCEPTED")
+
+
 def test_a_geofence_is_loaded_listed_and_kept(mavproxy):
     mavproxy.ask("fence load fence.txt", r"Sent all 4 fence items[\s\S]*TYPE_FENCE: ACCEPTED")
-    mavproxy.ask("fence list", r"5001 \d 47\.3976\d* 8\.545[\s\S]*\n5001 \d 47\.3979\d* 8\.545")
+    mavproxy.ask("fence list", r"5001 \d 47\.3976\d* 8\.545[\s\S]*\n5001 \d 47\.3985\d* 8\.545")
     take_off(mavproxy)
     mavproxy.type(f"{SETPOINT} 0xDC7 0 0 0 0 5 0 0 0 0 0 0")
     go_offboard(mavproxy)

@@ -1,5 +1,6 @@
 """MAVSDK flies the simulator with every plugin that a multirotor's programs use; each test has a vehicle of its own."""
 
+import asyncio
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 import pytest
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.geofence import GeofenceAsync
+from mavsdk.asyncio.plugins.manual_control import ManualControlAsync
 from mavsdk.asyncio.plugins.mission import MissionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
@@ -210,6 +212,40 @@ async def test_raw_fences_and_rally_points(base):
         (fence,), (rally,) = await raw.download_geofence(), await raw.download_rallypoints()
         assert (fence.command, fence.param1, fence.x) == (5003, 30.0, 473977432)
         assert (rally.command, rally.x, rally.z) == (5100, 473978332, 10.0)
+
+
+async def test_sticks_fly_position_and_altitude_control(base):
+    async with flier(base, 7) as f:
+        sticks = ManualControlAsync(f.system)
+        stick = [0.0, 0.0, 0.5, 0.0]
+
+        async def hold_them() -> None:
+            while True:
+                await sticks.set_manual_control_input(*stick)
+                await asyncio.sleep(0.02)
+
+        await f.take_off()
+        async with asyncio.TaskGroup() as group:
+            hands = group.create_task(hold_them())
+            await asyncio.sleep(0.3)
+            await sticks.start_position_control()
+            await f.in_mode(FlightMode.POSCTL)
+            stick[0] = 0.5
+
+            async def is_moving() -> bool:
+                return math.hypot(*(await f.velocity())[:2]) > 1.0
+
+            await until(is_moving)
+            stick[0] = 0.0
+            await sticks.start_altitude_control()
+            await f.in_mode(FlightMode.ALTCTL)
+            stick[2] = 1.0
+
+            async def is_climbing() -> bool:
+                return (await f.velocity())[2] < -1.0
+
+            await until(is_climbing)
+            hands.cancel()
 
 
 async def test_orders_of_the_action_plugin_and_a_failsafe(base):
