@@ -21,6 +21,7 @@ from missions.faults import (
     parse_simulator_fault,
 )
 from missions.mission import LinkSettings
+from sitl.dialect import mavlink
 from sitl.link.control_port import obey
 from sitl.link.faulty_link import Direction, FaultyLink
 from sitl.microservices.outbox import Link
@@ -132,6 +133,18 @@ def test_positioning_that_comes_back_ends_the_blind_landing():
     flown.until(lambda: flown.mode == "HOLD", 3.0)
     flown.run(3.0)
     assert np.linalg.norm(flown.velocity) < 0.3
+
+
+def test_offboard_by_position_needs_positioning_and_by_attitude_does_not():
+    flown = Flown().take_off(6.0)
+    flown.stream(position=(0.0, 0.0, -6.0)).offboard()
+    flown.simulator.order(GpsLoss())
+    assert flown.run(6.0).mode == "LAND"
+    assert flown.velocity[2] < -0.4
+    level = mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 7, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.6)
+    flown.go_silent().send(level, link=Link.ONBOARD)
+    flown.run(0.04)
+    assert flown.mode == "OFFBOARD"
 
 
 def test_a_pilots_landing_goes_on_blind():
