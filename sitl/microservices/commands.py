@@ -186,7 +186,7 @@ def _request_message(server: CommandServer, command: Command, sender: Sender) ->
         _send_available_modes(server, _number(command.params[1]), sender)
         return Result.ACCEPTED
     stream = BY_ID.get(number)
-    if stream is None:
+    if stream is None or number == mavlink.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION:  # PX4 sends that as a stream only
         return Result.DENIED
     server.streams[sender.link].send_now(stream.name, server.moment())
     return Result.ACCEPTED

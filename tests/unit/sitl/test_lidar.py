@@ -214,14 +214,13 @@ def test_a_lidar_does_not_change_the_flight():
     np.testing.assert_array_equal(seen.truth.position_enu_m, blind.truth.position_enu_m)
 
 
-def test_utm_global_position_is_sent_when_asked_for():
-    simulator = Simulator(1, seed=1)
-    for _ in range(50):
-        simulator.step()
-    assert not messages(simulator, mavlink.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION, Link.GROUND)
-    request = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 340, *[0] * 6)
-    simulator.receive(1, Link.GROUND, request.pack(mavlink.MAVLink(None, 255, 190)))
-    (found,) = messages(simulator, mavlink.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION, Link.GROUND)
+def test_utm_global_position_is_streamed_when_asked_for():
+    flown = Flown().run(1.0)
+    assert not flown.messages("UTM_GLOBAL_POSITION")
+    assert flown.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 340, 2e5) == mavlink.MAV_RESULT_ACCEPTED
+    flown.run(2.0)
+    assert 10 <= len(flown.messages("UTM_GLOBAL_POSITION")) <= 11
+    found = flown.last("UTM_GLOBAL_POSITION")
     assert found.lat == pytest.approx(473977432, abs=20)
     assert found.flight_state == mavlink.UTM_FLIGHT_STATE_GROUND
     assert not found.flags & mavlink.UTM_DATA_AVAIL_FLAGS_NEXT_WAYPOINT_AVAILABLE
