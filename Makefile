@@ -42,7 +42,7 @@ test: $(VENV)/.installed-dev  ## all tests but the slow ones: first what runs in
 
 test-all: $(VENV)/.installed-dev  ## every test, the slow ones too
 	@$(BIN)/python -m tests.browser.chromium
-	$(TEST) -n 2 -m "not processes and not browser"
+	$(TEST) --hypothesis-profile=new-examples -n 2 -m "not processes and not browser"
 	$(TEST) -m "processes or browser"
 
 bench-sitl: $(VENV)/.installed-dev  ## what the simulator costs: CPU, memory, pace, boot, with the required figures

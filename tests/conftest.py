@@ -1,10 +1,18 @@
-"""Browser tests need a Chromium: without one they are left out, loudly, or fail where REQUIRE_BROWSER=1 is set."""
+"""Browser tests need a Chromium: without one they are left out, loudly, or fail where REQUIRE_BROWSER=1 is set.
+
+Property tests take the same examples in every run of `make test`, and new ones in every run of `make test-all`.
+"""
 
 import os
 
 import pytest
+from hypothesis import settings
 
 from tests.browser.chromium import find_chromium
+
+settings.register_profile("same-examples", derandomize=True, database=None)
+settings.register_profile("new-examples", print_blob=True)
+settings.load_profile("same-examples")
 
 REQUIRED = os.environ.get("REQUIRE_BROWSER") == "1"
 ADVICE = "no Chromium was found (tried $CHROMIUM, chromium, google-chrome and playwright's own)"

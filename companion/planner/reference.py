@@ -107,9 +107,10 @@ def follow(way: Way, from_m: float, to_m: float, start: Array, path: Array) -> N
         at_m = from_m + length_m * j / (n - 1)
         while i < len(arc_m) - 2 and arc_m[i + 1] < at_m:
             i += 1
-        share = min(max((at_m - arc_m[i]) / max(arc_m[i + 1] - arc_m[i], 1e-9), 0.0), 1.0)
+        after = min(i + 1, len(arc_m) - 1)  # the way of a vehicle at its target is one sample
+        share = min(max((at_m - arc_m[i]) / max(arc_m[after] - arc_m[i], 1e-9), 0.0), 1.0)
         for column in range(5):
-            path[j, column] = samples[i, column] + share * (samples[i + 1, column] - samples[i, column])
+            path[j, column] = samples[i, column] + share * (samples[after, column] - samples[i, column])
     off_east, off_north, off_up = start[0, 0] - path[0, 0], start[0, 1] - path[0, 1], start[0, 2] - path[0, 2]
     joined_m = min(max(JOIN_SLOPE * span(off_east, off_north, off_up), 0.25 * length_m), length_m)
     for j in range(n):

@@ -5,7 +5,7 @@ import pytest
 
 from companion.planner.grid_search import way_around
 from companion.planner.guide import blocked_samples, corner_speeds, lay_guide, lead_around, nearest_on
-from companion.planner.reference import LEG_SPEED, SPEED_CAP, TANGENT, lay_reference, reach_speeds
+from companion.planner.reference import LEG_SPEED, SPEED_CAP, TANGENT, Way, lay_reference, reach_speeds
 from companion.planner.spline_shape import sample_rows, spline_shape
 from missions import bspline, obstacles
 from missions.mission_items import Track
@@ -218,6 +218,14 @@ def test_leg_speeds_cap_a_reference_and_tangents_are_unit_vectors():
     assert slow.samples[:, SPEED_CAP].max() == pytest.approx(1.2 / LIMITS.nominal_ratio)
     lengths = np.linalg.norm(slow.samples[:, TANGENT : TANGENT + 3], axis=1)
     assert np.all((np.abs(lengths - 1.0) < 1e-9) | (lengths == 0.0))
+
+
+def test_a_reference_at_the_target_reads_nothing_behind_the_ways_only_sample():
+    samples = np.vstack((np.array([*START_M, 3.0, 0.2]), np.full(5, np.nan)))
+    at_target = Way(samples[:1], np.array([0.0, np.nan])[:1])
+    start = np.array([START_M, np.zeros(3), np.zeros(3)])
+    reference = lay_reference(at_target, 0.0, 0.0, start, 61, LIMITS, AROUND.obstacles)
+    np.testing.assert_allclose(reference.samples[:, :3], np.tile(START_M, (61, 1)), atol=1e-9)
 
 
 # ------------------------------------------------------------------------ spline shape
