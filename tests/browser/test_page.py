@@ -164,7 +164,7 @@ async def test_cameras_see_the_whole_world_look_from_above_and_follow(open_page:
     [
         pytest.param("field", 1, marks=pytest.mark.slow),
         pytest.param("indoor-unmapped", 2, marks=pytest.mark.slow),
-        ("fleet-10", 10),
+        pytest.param("fleet-10", 10, marks=pytest.mark.slow),
         ("terrain-1-5uav", 5),
     ],
 )

@@ -78,6 +78,7 @@ def test_help_gives_examples():
     assert "gcs experiment table2 --runs 5" in finished.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["pso", "ipso", "gapso", "ca", "aca"])
 def test_a_baseline_plans_like_the_planner_itself(algorithm: str):
     finished = programs.run("gcs", "plan", "indoor", "--algorithm", algorithm)

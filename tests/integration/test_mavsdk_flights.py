@@ -32,7 +32,7 @@ from mavsdk.plugins.telemetry import FlightMode
 from tests.integration.mavsdk_companion import companion, until
 from tests.integration.sitl_process import free_instance_base, running_sitl
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.processes, pytest.mark.slow]
 
 NAN = math.nan
 FENCE_ITEM = mission_raw.MissionItem(0, 5, 5003, 1, 1, 30.0, 0, 0, 0, 473977432, 85455942, 0.0, 1)
