@@ -162,10 +162,10 @@ async def test_cameras_see_the_whole_world_look_from_above_and_follow(open_page:
 @pytest.mark.parametrize(
     ("mission", "vehicles"),
     [
-        pytest.param("field", 1, marks=pytest.mark.slow),
+        ("field", 1),
         pytest.param("indoor-unmapped", 2, marks=pytest.mark.slow),
         pytest.param("fleet-10", 10, marks=pytest.mark.slow),
-        ("terrain-1-5uav", 5),
+        pytest.param("terrain-1-5uav", 5, marks=pytest.mark.slow),
     ],
 )
 async def test_every_world_is_drawn(open_page: OpenPage, mission: str, vehicles: int):

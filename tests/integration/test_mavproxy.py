@@ -13,7 +13,7 @@ import pytest
 from tests.integration.mavproxy_session import MavproxySession, running_mavproxy
 from tests.integration.sitl_process import free_instance_base, running_sitl
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.processes, pytest.mark.slow]
 
 HOME = "47.3977432\t8.5455942"
 NORTH_10_M = "47.3978332\t8.5455942"
