@@ -7,9 +7,11 @@ read through its mavlink_direct plugin, since the telemetry plugin hides frames,
 import asyncio
 import math
 import socket
+import threading
 from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
@@ -38,8 +40,6 @@ COMPANION, AUTOPILOT = 191, 1
 """MAVLink component ids."""
 SETUP_RETRY_S = 2.0
 """Between two rounds of asking for streams and for the origin, until the origin is known (wall clock)."""
-THREADS = 4
-"""For calls that wait for an answer: one that gets none must not hold up the others."""
 
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, MISSION_START = 511, 512, 300
 GPS_GLOBAL_ORIGIN = 49
@@ -61,7 +61,6 @@ class Px4:
         self._url = url
         self._complain = complain
         self._events: asyncio.Queue[Event] = asyncio.Queue()
-        self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="px4")
         self._mavsdk: Mavsdk | None = None
         self._system: System | None = None
         self._direct: dict[int, MavlinkDirect] = {}
@@ -91,9 +90,9 @@ class Px4:
         """End everything; see `Autopilot.close`."""
         if self._setup is not None:
             self._setup.cancel()
-        if self._mavsdk is not None:
-            self._mavsdk.destroy()
-        self._threads.shutdown(wait=False, cancel_futures=True)
+        mavsdk, self._mavsdk = self._mavsdk, None
+        if mavsdk is not None:
+            mavsdk.destroy()
 
     async def receive(self) -> Event:
         """The next event; see `Autopilot.receive`."""
@@ -140,9 +139,13 @@ class Px4:
     # -------------------------------------------------------------------- messages
 
     def _soon(self, handler: Callable[..., None], *arguments: Any) -> None:
-        """Called in MAVSDK's threads: go on in the event loop, which may be closed already."""
-        if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(handler, *arguments)
+        """Called in MAVSDK's threads: go on in the event loop, unless that has ended, or the connection meanwhile."""
+        with suppress(RuntimeError):  # the loop is closed
+            self._loop.call_soon_threadsafe(self._if_open, handler, arguments)
+
+    def _if_open(self, handler: Callable[..., None], arguments: tuple[Any, ...]) -> None:
+        if self._mavsdk is not None:  # a destroyed one crashes when it is asked anything
+            handler(*arguments)
 
     def _on_message(self, message: MavlinkMessage) -> None:
         if message.component_id == AUTOPILOT:
@@ -281,13 +284,31 @@ class Px4:
         return msgspec.json.decode(ack.fields_json, type=CommandAck).result == CommandResult.ACCEPTED
 
     async def _ask(self, what: str, call: Callable[[], T]) -> T:
-        """Make a call that waits for an answer, in a thread.
+        """Make a call that waits for an answer, in a thread of its own.
+
+        One that gets no answer holds up neither the others nor the end of the program: MAVSDK never returns from the
+        calls that are open when it is destroyed, so their threads must be daemons, which those of a pool are not.
 
         Raises:
             CommandRefused: the answer was no, or there was none.
         """
+        answer: asyncio.Future[T] = self._loop.create_future()
+
+        def settle(outcome: Callable[[], None]) -> None:
+            if not answer.done():
+                outcome()
+
+        def ask() -> None:
+            try:
+                found = call()
+            except Exception as problem:
+                self._soon(settle, partial(answer.set_exception, problem))
+            else:
+                self._soon(settle, partial(answer.set_result, found))
+
+        threading.Thread(target=ask, name=what, daemon=True).start()
         try:
-            return await self._loop.run_in_executor(self._threads, call)
+            return await answer
         except (MavsdkError, RuntimeError) as refused:  # RuntimeError: the plugin was destroyed meanwhile
             raise CommandRefused(f"{what}: {refused}") from refused
 

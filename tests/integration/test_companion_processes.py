@@ -6,6 +6,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,24 @@ def test_without_a_vehicle_in_the_air_it_refuses_to_start(desk: FlightDesk, base
 def test_it_ends_with_its_parent(desk: FlightDesk, base: int):
     with running_companion(base, "--supervised") as process:
         desk.until(lambda: desk.state is CompanionState.WAITING, STARTUP_S)
+        process.stdin.close()
+        assert process.wait(10.0) == 0
+
+
+def test_it_ends_while_the_autopilot_owes_it_an_answer(base: int):
+    """MAVSDK never answers what is still open when it is destroyed."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as mute, running_companion(base, "--supervised") as process:
+        mute.settimeout(0.2)
+        codec = mavlink.MAVLink(None, 1, 1)
+        until_s = time.monotonic() + STARTUP_S
+        asked = False
+        while not asked:
+            assert time.monotonic() < until_s
+            heartbeat = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)
+            mute.sendto(heartbeat.pack(codec), ("127.0.0.1", 14540 + base))
+            with suppress(TimeoutError):
+                heard = codec.parse_buffer(mute.recv(65535)) or []
+                asked = any(message.get_type() == "COMMAND_LONG" for message in heard)
         process.stdin.close()
         assert process.wait(10.0) == 0
 
