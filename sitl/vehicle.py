@@ -107,6 +107,7 @@ class Vehicle:
         self._untargeted: dict[str, Handler] = {
             "HEARTBEAT": lambda m, s: self._peers.receive_heartbeat(m, self._now_s),
             "MANUAL_CONTROL": lambda m, s: self._receive_sticks(m),
+            "FOLLOW_TARGET": lambda m, s: self._setpoints.receive_follow_target(m, self._now_s),
             "TIMESYNC": lambda m, s: self._clock.receive_timesync(m, s, self._now_s),
             "PING": lambda m, s: self._clock.receive_ping(m, s, self._now_s),
         }

@@ -61,6 +61,7 @@ class Mode(Enum):
     MISSION = ModeTraits("Mission", MainMode.AUTO, 4, standard_mode=6)
     RTL = ModeTraits("Return", MainMode.AUTO, 5, standard_mode=5, allows_arming=False)
     LAND = ModeTraits("Land", MainMode.AUTO, 6, standard_mode=7, allows_arming=False, needs_position=False)
+    FOLLOW = ModeTraits("Follow Target", MainMode.AUTO, 8, base_mode=CUSTOM | STABILIZE, allows_arming=False)
     TERMINATION = ModeTraits(
         "Termination", MainMode.TERMINATION, base_mode=CUSTOM, allows_arming=False, needs_position=False
     )

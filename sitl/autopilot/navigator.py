@@ -6,6 +6,7 @@ from collections.abc import Callable
 from missions.mission_items import MissionItem
 from sitl.autopilot.craft import Craft
 from sitl.autopilot.flight_modes import Descend, FlightMode, Hold, Land, Return, Takeoff
+from sitl.autopilot.follow import Follow
 from sitl.autopilot.geofence import Geofence
 from sitl.autopilot.mission_flight import MissionFlight, Outcome
 from sitl.autopilot.modes import Mode
@@ -32,11 +33,13 @@ class Navigator:
         self._takeoff = Takeoff(craft)
         self._hold = Hold(craft)
         self._orbit = Orbit(craft)
+        self.follow = Follow(craft)
         self.mission = MissionFlight(craft, on_reached)
         self._modes: dict[Mode, FlightMode] = {
             Mode.TAKEOFF: self._takeoff,
             Mode.HOLD: self._hold,
             Mode.ORBIT: self._orbit,
+            Mode.FOLLOW: self.follow,
             Mode.LAND: Land(craft),
             Mode.RTL: Return(craft),
             Mode.POSITION: PositionSticks(craft, sticks),

@@ -130,6 +130,15 @@ _SAFETY = (
 )
 
 
+_FOLLOW = (
+    Parameter("FLW_TGT_HT", 8.0, 1.0, 1000.0),
+    Parameter("FLW_TGT_DST", 8.0, 1.0, 1000.0),
+    Parameter("FLW_TGT_FA", 180.0, -180.0, 180.0),
+    Parameter("FLW_TGT_RS", 0.1, 0.0, 0.99),
+    Parameter("FLW_TGT_ALT_M", 0, 0, 2),
+    Parameter("FLW_TGT_MAX_VEL", 5.0, 0.1, 20.0),
+)
+
 _MANUAL = (
     Parameter("COM_RC_IN_MODE", 1, 0, 4),
     Parameter("COM_RC_LOSS_T", 0.5, 0.0, 35.0),
@@ -162,4 +171,4 @@ def parameter_table(airframe: Airframe) -> tuple[Parameter, ...]:
         Parameter("MPC_THR_HOVER", round(airframe.hover_thrust, 3), 0.1, 0.8),
         Parameter("THR_MDL_FAC", airframe.thrust_curve, airframe.thrust_curve, airframe.thrust_curve),
     )
-    return tuple(sorted(_POSITION + _GUIDANCE + _TAKEOFF_AND_LANDING + _ATTITUDE + _SAFETY + _MANUAL + own))
+    return tuple(sorted(_POSITION + _GUIDANCE + _TAKEOFF_AND_LANDING + _ATTITUDE + _SAFETY + _FOLLOW + _MANUAL + own))

@@ -1,7 +1,10 @@
-"""SET_POSITION_TARGET_LOCAL_NED, ..._GLOBAL_INT and SET_ATTITUDE_TARGET, handed to Offboard."""
+"""SET_POSITION_TARGET_LOCAL_NED, ..._GLOBAL_INT, SET_ATTITUDE_TARGET, for Offboard, and FOLLOW_TARGET, for Follow."""
+
+import math
 
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.offboard import Ignore, IgnoreAttitude, PositionTarget
+from sitl.autopilot.places import is_place
 from sitl.dialect import Message
 
 ALL_BITS = 0x0FFF
@@ -24,6 +27,15 @@ class SetpointServer:
         place = m.lat_int * 1e-7, m.lon_int * 1e-7, m.alt
         target = _target(m, (0.0, 0.0, 0.0))
         self._autopilot.offboard.receive_global(target, place, craft.frame, craft.home_altitude_m, now_s)
+
+    def receive_follow_target(self, message: Message, now_s: float) -> None:
+        """FOLLOW_TARGET, which has no receiver: Follow keeps near it; a velocity that is none counts as zero."""
+        m, autopilot = message, self._autopilot
+        latitude_deg, longitude_deg = m.lat * 1e-7, m.lon * 1e-7
+        if is_place(latitude_deg, longitude_deg) and math.isfinite(m.alt):
+            north, east = (v if math.isfinite(v) else 0.0 for v in m.vel[:2])
+            point = autopilot.craft.frame.local(latitude_deg, longitude_deg, m.alt)
+            autopilot.navigator.follow.receive(point, (north, east), now_s)
 
     def receive_attitude(self, message: Message, now_s: float) -> None:
         m = message

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import pytest
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.calibration import CalibrationAsync
+from mavsdk.asyncio.plugins.follow_me import FollowMeAsync
 from mavsdk.asyncio.plugins.ftp import FtpAsync
 from mavsdk.asyncio.plugins.geofence import GeofenceAsync
 from mavsdk.asyncio.plugins.log_files import LogFilesAsync
@@ -23,6 +24,8 @@ from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins import mission_raw
 from mavsdk.plugins.action import Action, ActionError, RelayCommand
 from mavsdk.plugins.calibration import CalibrationError
+from mavsdk.plugins.follow_me import Config as FollowMeConfig
+from mavsdk.plugins.follow_me import TargetLocation
 from mavsdk.plugins.ftp import FtpError
 from mavsdk.plugins.geofence import Circle, FenceType, GeofenceData, Point, Polygon
 from mavsdk.plugins.log_files import LogFilesError
@@ -52,7 +55,7 @@ RALLY_ITEM = mission_raw.MissionItem(0, 6, 5100, 1, 1, 0, 0, 0, 0, 473978332, 85
 @pytest.fixture(scope="module")
 def base() -> Iterator[int]:
     shift = free_instance_base()
-    with running_sitl("--vehicles", "10", "--speed", "5", base=shift):
+    with running_sitl("--vehicles", "11", "--speed", "5", base=shift):
         yield shift
 
 
@@ -281,6 +284,24 @@ async def test_orders_of_the_action_plugin_and_a_failsafe(base):
             return not await f.telemetry.armed()
 
         await until(is_disarmed)
+
+
+async def test_somebody_is_followed(base):
+    async with flier(base, 11) as f:
+        follow_me = FollowMeAsync(f.system)
+        await f.take_off()
+        await follow_me.set_config(
+            FollowMeConfig(8.0, 5.0, 0.1, FollowMeConfig.FollowAltitudeMode.CONSTANT, 5.0, 180.0)
+        )
+        assert (await follow_me.get_config()).follow_distance_m == 5.0
+        place, (north, east, _) = await f.telemetry.position(), await f.position()
+        latitude, longitude, altitude = place.latitude_deg + 1.8e-4, place.longitude_deg, place.absolute_altitude_m
+        await follow_me.set_target_location(TargetLocation(latitude, longitude, altitude, 0.0, 0.0, 0.0))
+        await follow_me.start()
+        await f.in_mode(FlightMode.FOLLOW_ME)
+        await f.comes_to(f.position, (north + 15.0, east, -8.0), 1.5)
+        await follow_me.stop()
+        await f.in_mode(FlightMode.HOLD)
 
 
 async def test_what_is_not_there_is_refused_at_once(base):
