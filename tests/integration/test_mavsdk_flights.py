@@ -296,9 +296,9 @@ async def test_somebody_is_followed(base):
         assert (await follow_me.get_config()).follow_distance_m == 5.0
         place, (north, east, _) = await f.telemetry.position(), await f.position()
         latitude, longitude, altitude = place.latitude_deg + 1.8e-4, place.longitude_deg, place.absolute_altitude_m
-        await follow_me.set_target_location(TargetLocation(latitude, longitude, altitude, 0.0, 0.0, 0.0))
         await follow_me.start()
         await f.in_mode(FlightMode.FOLLOW_ME)
+        await follow_me.set_target_location(TargetLocation(latitude, longitude, altitude, 0.0, 0.0, 0.0))
         await f.comes_to(f.position, (north + 15.0, east, -8.0), 1.5)
         await follow_me.stop()
         await f.in_mode(FlightMode.HOLD)
