@@ -165,7 +165,7 @@ class FleetRun:
 
 @contextmanager
 def running_fleet(n_vehicles: int) -> Iterator[FleetRun]:
-    """The program at real time on open ground, on one core from when it is ready; ended with the block.
+    """The program at real time on open ground, on one core from when it is ready, the listener on the others.
 
     Raises:
         RuntimeError: it does not start.
@@ -174,6 +174,8 @@ def running_fleet(n_vehicles: int) -> Iterator[FleetRun]:
     ports = ["--instance-base", str(INSTANCE_BASE), "--onboard-ports", f"{ONBOARD_PORT}:{COMPANION_PORT}"]
     command = [sys.executable, "-m", "sitl", "--vehicles", str(n_vehicles), *ports, "--supervised"]
     begun_s = time.monotonic()
+    cores = os.sched_getaffinity(0)
+    core = max(cores)
     try:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdin is not None
@@ -182,10 +184,12 @@ def running_fleet(n_vehicles: int) -> Iterator[FleetRun]:
             if not line.startswith("sitl: ready"):
                 raise RuntimeError(f"expected the simulator to be ready, it said {line!r}")
             ready_after_s = time.monotonic() - begun_s
-            os.sched_setaffinity(process.pid, {max(os.sched_getaffinity(0))})
+            os.sched_setaffinity(process.pid, {core})
+            os.sched_setaffinity(0, cores - {core} or cores)
             listener.listen(STARTING_S)
             yield FleetRun(process, listener, ready_after_s)
             process.stdin.close()
             process.wait(10.0)
     finally:
+        os.sched_setaffinity(0, cores)
         listener.close()
