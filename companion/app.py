@@ -219,7 +219,8 @@ class App:
     async def _leave_after_error(self, problems: ExceptionGroup[Exception]) -> None:
         """Our own error: do what can still be done for the vehicle, and say what happened."""
         was_in_control = self.pilot.in_control
-        self.pilot.fail()
+        for instruction in self.pilot.fail(self._now_s):
+            self._carry_out(instruction)
         first: BaseException = problems
         while isinstance(first, BaseExceptionGroup):
             first = first.exceptions[0]
