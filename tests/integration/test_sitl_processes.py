@@ -8,6 +8,7 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,6 +49,14 @@ def test_simulated_time_passes_at_the_ordered_speed(base, ground):
         begin_s = time.monotonic()
         ground.until(lambda: ground.last("ATTITUDE").time_boot_ms > first + 6000)
         assert time.monotonic() - begin_s == pytest.approx(1.5, abs=0.4)
+
+
+def test_no_scipy_is_loaded_into_it(base):
+    """It would be a tenth of the program's memory, for a BLAS that no kernel calls."""
+    with running_sitl("--vehicles", "1", base=base) as process:
+        mapped = Path(f"/proc/{process.pid}/maps").read_text()
+    assert "llvmlite" in mapped
+    assert "cython_blas" not in mapped
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

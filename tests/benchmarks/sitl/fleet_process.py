@@ -1,5 +1,6 @@
 """The `sitl` program with many vehicles: its CPU time, memory and pace while all their telemetry is received."""
 
+import os
 import selectors
 import socket
 import subprocess
@@ -30,8 +31,6 @@ class Window:
     """What one stretch of time has cost."""
 
     cpu_s: float
-    waited_s: float
-    """For a core, while other programs had them."""
     wall_s: float
     simulated_s: float
     messages: float
@@ -43,7 +42,7 @@ class Memory:
     """Of a process."""
 
     resident_mb: float
-    """All of it, with the code of libraries, which other processes share and the kernel may drop."""
+    """All of it, libraries' code included."""
     own_mb: float
     """What no file holds: the process's data."""
 
@@ -160,15 +159,13 @@ class FleetRun:
 
     def _now(self) -> tuple[float, ...]:
         """What a `Window` is the difference of."""
-        ran_ns, waited_ns, _ = Path(f"/proc/{self._pid}/schedstat").read_text().split()
-        listener = self.listener
-        now_s = time.monotonic()
-        return int(ran_ns) * 1e-9, int(waited_ns) * 1e-9, now_s, listener.simulated_s, float(listener.messages)
+        ran_ns = int(Path(f"/proc/{self._pid}/schedstat").read_text().split()[0])
+        return ran_ns * 1e-9, time.monotonic(), self.listener.simulated_s, float(self.listener.messages)
 
 
 @contextmanager
 def running_fleet(n_vehicles: int) -> Iterator[FleetRun]:
-    """The program, which has one thread, at real time on open ground; ended with the block.
+    """The program at real time on open ground, on one core from when it is ready; ended with the block.
 
     Raises:
         RuntimeError: it does not start.
@@ -185,6 +182,7 @@ def running_fleet(n_vehicles: int) -> Iterator[FleetRun]:
             if not line.startswith("sitl: ready"):
                 raise RuntimeError(f"expected the simulator to be ready, it said {line!r}")
             ready_after_s = time.monotonic() - begun_s
+            os.sched_setaffinity(process.pid, {max(os.sched_getaffinity(0))})
             listener.listen(STARTING_S)
             yield FleetRun(process, listener, ready_after_s)
             process.stdin.close()

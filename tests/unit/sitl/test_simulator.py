@@ -6,12 +6,15 @@ import zlib
 import numpy as np
 import pytest
 
+from missions.faults import BatteryLevel
 from missions.frames import AutopilotFrame, GeodeticPoint
 from missions.mission import Positioning, load_mission
+from sitl.cli import warm_simulator
 from sitl.dynamics.airframe import X500_LIKE
 from sitl.fleet import TICK_S, Fleet
 from sitl.link.truth_log import HEADER, TruthLog
 from sitl.microservices.outbox import Link
+from sitl.settings import Settings
 from sitl.simulator import Simulator
 from tests.unit.sitl.flown import NAN, Flown, field
 
@@ -136,3 +139,11 @@ def test_local_positions_begin_at_zero_whatever_the_altitude_reads():
     for sysid in (1, 2, 3):
         local = flown.last("LOCAL_POSITION_NED", sysid, Link.ONBOARD)
         assert np.allclose([local.x, local.y, local.z], 0.0, atol=0.2)
+
+
+def test_a_warm_simulator_keeps_its_missions_faults_for_whatever_vehicle():
+    """The code is warmed up with the first two vehicles, and these need not know the others' faults."""
+    simulator = warm_simulator(field(3, faults=(BatteryLevel(vehicle=3, remaining=0.2),)), Settings(), {})
+    assert list(simulator.vehicles) == [1, 2, 3]
+    simulator.step()
+    assert [memory.charge.remaining for memory in simulator.memories.values()] == [1.0, 1.0, 0.2]
