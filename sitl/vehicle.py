@@ -14,6 +14,7 @@ from sitl.autopilot.reports import Severity
 from sitl.dialect import Message
 from sitl.dynamics.airframe import Airframe
 from sitl.fleet import TICK_S
+from sitl.microservices.absent_services import AbsentServices
 from sitl.microservices.clock import ClockServer
 from sitl.microservices.command_server import CommandServer
 from sitl.microservices.commands import HANDLERS
@@ -101,6 +102,7 @@ class Vehicle:
         self._commands = CommandServer(autopilot, outbox, self._streams, self._moment, say, speed, HANDLERS)
         self._setpoints = SetpointServer(autopilot)
         self._clock = ClockServer(outbox)
+        self._absent = AbsentServices(outbox)
         self._targeted = self._targeted_handlers()
         self._untargeted: dict[str, Handler] = {
             "HEARTBEAT": lambda m, s: self._peers.receive_heartbeat(m, self._now_s),
@@ -125,6 +127,8 @@ class Vehicle:
             "SET_POSITION_TARGET_GLOBAL_INT": lambda m, s: setpoints.receive_global(m, self._now_s),
             "SET_ATTITUDE_TARGET": lambda m, s: setpoints.receive_attitude(m, self._now_s),
             "SETUP_SIGNING": self._signing.receive_setup,
+            "FILE_TRANSFER_PROTOCOL": self._absent.receive_file_request,
+            "LOG_REQUEST_LIST": self._absent.receive_log_request,
             "PARAM_REQUEST_LIST": parameters.receive_list,
             "PARAM_REQUEST_READ": parameters.receive_read,
             "PARAM_SET": parameters.receive_set,

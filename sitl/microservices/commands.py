@@ -14,6 +14,8 @@ from sitl.microservices.streams import BY_ID
 
 FORCE = 21196
 """ARM_DISARM's magic number: whatever the checks say."""
+NOT_ON_REQUEST = {mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mavlink.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION}
+"""Messages that a PX4 sends by itself only."""
 _KNOWN_MAIN_MODES = range(1, 8)
 _AUTO = 4
 
@@ -186,7 +188,7 @@ def _request_message(server: CommandServer, command: Command, sender: Sender) ->
         _send_available_modes(server, _number(command.params[1]), sender)
         return Result.ACCEPTED
     stream = BY_ID.get(number)
-    if stream is None or number == mavlink.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION:  # PX4 sends that as a stream only
+    if stream is None or number in NOT_ON_REQUEST:
         return Result.DENIED
     server.streams[sender.link].send_now(stream.name, server.moment())
     return Result.ACCEPTED

@@ -55,6 +55,18 @@ STREAMS = (
 BY_ID = {LAYOUTS[stream.name].message_id: stream for stream in STREAMS}
 """Message id -> stream."""
 
+_ABSENT = """
+    ACTUATOR_OUTPUT_STATUS ADSB_VEHICLE ATT_POS_MOCAP AUTOPILOT_STATE_FOR_GIMBAL_DEVICE CAMERA_IMAGE_CAPTURED
+    CAMERA_TRIGGER COLLISION DEBUG DEBUG_FLOAT_ARRAY DEBUG_VECT DISTANCE_SENSOR EFI_STATUS FLIGHT_INFORMATION
+    GENERATOR_STATUS GIMBAL_DEVICE_ATTITUDE_STATUS GIMBAL_DEVICE_SET_ATTITUDE GIMBAL_MANAGER_STATUS GPS2_RAW
+    GPS_RTCM_DATA GPS_STATUS HIGH_LATENCY2 HIL_ACTUATOR_CONTROLS HIL_STATE_QUATERNION MANUAL_CONTROL MOUNT_ORIENTATION
+    NAMED_VALUE_FLOAT NAV_CONTROLLER_OUTPUT OPEN_DRONE_ID_BASIC_ID OPEN_DRONE_ID_LOCATION OPEN_DRONE_ID_SYSTEM
+    OPTICAL_FLOW_RAD ORBIT_EXECUTION_STATUS RAW_RPM RC_CHANNELS SCALED_IMU SCALED_IMU2 SCALED_IMU3 SCALED_PRESSURE2
+    SCALED_PRESSURE3 SMART_BATTERY_INFO STORAGE_INFORMATION WIND_COV
+"""
+WITHOUT_DATA = frozenset(LAYOUTS[name].message_id for name in _ABSENT.split())
+"""Messages that a PX4 streams when told to, and that nothing here makes: the order is taken, and nothing comes."""
+
 
 @dataclass(slots=True)
 class _Schedule:
@@ -104,10 +116,10 @@ class Streams:
             self._send(schedule.layout, values)
 
     def set_interval(self, message_id: int, interval_us: float, now_s: float) -> bool:
-        """SET_MESSAGE_INTERVAL: -1 is off, 0 the default; False for a message that cannot be streamed."""
+        """SET_MESSAGE_INTERVAL: -1 is off, 0 the default; False for a message that a PX4 cannot stream."""
         stream = BY_ID.get(message_id)
         if stream is None:
-            return False
+            return message_id in WITHOUT_DATA
         interval_s = self._default_s(stream) if interval_us == 0.0 else interval_us * 1e-6
         self._set(stream.name, interval_s, now_s)
         return True

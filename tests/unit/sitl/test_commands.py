@@ -41,7 +41,11 @@ ON_THE_GROUND = [
     (511, (30, 20000), ACCEPTED),
     (511, (99999, 20000), FAILED),
     (511, (30, NAN), DENIED),
+    (511, (132, 20000), ACCEPTED),
+    (511, (246, 20000), ACCEPTED),
     (512, (148,), ACCEPTED),
+    (512, (42,), DENIED),
+    (512, (259,), DENIED),
     (512, (340,), DENIED),
     (512, (NAN,), DENIED),
 ]
@@ -262,3 +266,32 @@ def test_the_same_order_given_again_is_a_new_order():
     assert flown.mode == "HOLD"
     flown.command(21)
     assert flown.mode == "LAND"
+
+
+def test_messages_for_absent_equipment_can_be_ordered_and_do_not_come():
+    flown = Flown().boot()
+    flown.command(511, 132, 20000)
+    flown.run(0.5)
+    assert not flown.messages("DISTANCE_SENSOR")
+    flown.command(510, 132)
+    assert flown.last("MESSAGE_INTERVAL").interval_us == 0
+
+
+def test_a_request_for_files_is_refused_at_once():
+    flown = Flown().boot()
+    list_directory = bytes([7, 0, 0, 3, 1, 0, 0, 0, 0, 0, 0, 0]) + b"/"
+    payload = list(list_directory.ljust(251, b"\0"))
+    flown.send(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
+    answer = flown.last("FILE_TRANSFER_PROTOCOL")
+    assert (answer.target_system, answer.target_component) == (255, 190)
+    seq, opcode, size, requested, error = *answer.payload[:2:2], *answer.payload[3:6], answer.payload[12]
+    assert (seq, opcode, size, requested, error) == (8, 129, 1, 3, 7)
+    flown.forget()
+    flown.send(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, answer.payload))
+    assert not flown.messages("FILE_TRANSFER_PROTOCOL")
+
+
+def test_there_are_no_logs_and_one_entry_says_so():
+    flown = Flown().boot()
+    flown.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
+    assert [entry.num_logs for entry in flown.messages("LOG_ENTRY")] == [0]
