@@ -111,6 +111,7 @@ _SAFETY = (
     Parameter("SIM_BAT_DRAIN", 60.0, 1.0, 86400.0),
     Parameter("SIM_BAT_MIN_PCT", 50.0, 0.0, 100.0),
     Parameter("GF_ACTION", 2, 0, 5),
+    Parameter("SYS_FAILURE_EN", 0, 0, 1),
     Parameter("GF_MAX_HOR_DIST", 0.0, 0.0, 1e6),
     Parameter("GF_MAX_VER_DIST", 0.0, 0.0, 1e6),
     Parameter("CBRK_FLIGHTTERM", 121212, 0, 121212),

@@ -177,6 +177,11 @@ def _nothing_to_do(server: CommandServer, command: Command, sender: Sender) -> R
     return Result.ACCEPTED
 
 
+def _inject_failure(server: CommandServer, command: Command, sender: Sender) -> Result | None:
+    """Failures are ordered over the control port; PX4 is silent about them unless SYS_FAILURE_EN allows them."""
+    return Result.UNSUPPORTED if server.autopilot.parameters["SYS_FAILURE_EN"] else None
+
+
 def _silence(server: CommandServer, command: Command, sender: Sender) -> None:
     """Commands for equipment that is not there: PX4 leaves the answer to that equipment."""
 
@@ -265,6 +270,6 @@ HANDLERS: dict[int, Handler] = {
     _m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_named("AUTOPILOT_VERSION"),
     _m.MAV_CMD_DO_VTOL_TRANSITION: _silence,
     _m.MAV_CMD_DO_GRIPPER: _silence,
-    _m.MAV_CMD_INJECT_FAILURE: _silence,
+    _m.MAV_CMD_INJECT_FAILURE: _inject_failure,
     _m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: _silence,
 }

@@ -277,6 +277,13 @@ def test_messages_for_absent_equipment_can_be_ordered_and_do_not_come():
     assert flown.last("MESSAGE_INTERVAL").interval_us == 0
 
 
+def test_failures_are_not_injected_by_command_and_said_so_where_that_is_enabled():
+    flown = Flown().boot()
+    assert flown.command(420, 4, 1) is None
+    flown.set_parameter("SYS_FAILURE_EN", 1)
+    assert flown.command(420, 4, 1) == UNSUPPORTED
+
+
 def test_a_request_for_files_is_refused_at_once():
     flown = Flown().boot()
     list_directory = bytes([7, 0, 0, 3, 1, 0, 0, 0, 0, 0, 0, 0]) + b"/"
