@@ -22,7 +22,7 @@ from sitl.autopilot.parameter_table import parameter_table
 from sitl.dynamics.airframe import AirframeName
 from sitl.errors import BadPlace, SitlError
 from sitl.lean_numba import leave_scipy_out
-from sitl.link.parameter_files import ParameterFiles
+from sitl.link.memory_files import MemoryFiles
 from sitl.open_field import open_field
 from sitl.service import serve
 from sitl.settings import (
@@ -69,7 +69,10 @@ def fly(
         typer.Option(metavar="FILE", help="Keys of the ground links: 64 hex digits, for all or per system id."),
     ] = None,
     parameters: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Keep parameters here from one simulation to the next.")
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Keep parameters, keys and their timestamps here from one simulation to the next."
+        ),
     ] = None,
     lidar: Annotated[
         bool, typer.Option("--lidar", help="Send the companions what the mission's range sensor sees.")
@@ -104,7 +107,7 @@ def fly(
             supervised=supervised,
         )
         flown = _mission(mission, vehicles, origin)
-        files = ParameterFiles(parameters, parameter_table(airframe.airframe)) if parameters else None
+        files = MemoryFiles(parameters, parameter_table(airframe.airframe)) if parameters else None
         simulator = warm_simulator(flown, settings, _memories(flown, settings, files))
         asyncio.run(serve(simulator, settings, files))
     except* (MissionError, SitlError, OSError) as problems:
@@ -146,7 +149,7 @@ def _rehearsed(mission: Mission) -> Mission:
     return msgspec.structs.replace(mission, vehicles=mission.vehicles[:2], simulation=unharmed)
 
 
-def _memories(mission: Mission, settings: Settings, files: ParameterFiles | None) -> dict[int, Memory]:
+def _memories(mission: Mission, settings: Settings, files: MemoryFiles | None) -> dict[int, Memory]:
     """What the vehicles know before their first boot.
 
     Raises:
@@ -155,10 +158,9 @@ def _memories(mission: Mission, settings: Settings, files: ParameterFiles | None
     """
     sysids = [vehicle.sysid for vehicle in mission.vehicles]
     keys = load_signing_keys(settings.signing_key, sysids) if settings.signing_key else {}
-    return {
-        sysid: Memory(parameters=files.load(sysid) if files else {}, signing=SigningMemory(keys.get(sysid)))
-        for sysid in sysids
-    }
+    if files is not None:
+        return {sysid: files.load(sysid, keys) for sysid in sysids}
+    return {sysid: Memory(signing=SigningMemory(keys.get(sysid))) for sysid in sysids}
 
 
 def _mission(name: str | None, n_vehicles: int | None, origin: str | None) -> Mission:

@@ -69,3 +69,10 @@ class BadPlace(SitlError):
 
     def __init__(self, text: str) -> None:
         super().__init__(f"--origin {text}: expected LAT,LON,ALT in degrees and metres, such as 47.3977,8.5456,489.4")
+
+
+class BadSigningFile(SitlError):
+    """A stored key or its timestamps cannot be read; what is in the file is not shown."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(f"{path}: expected what this simulator has stored about signing, found something else")

@@ -9,14 +9,14 @@ from typing import Any
 
 from sitl.errors import NoStandardInput
 from sitl.link.control_port import ControlPort
-from sitl.link.parameter_files import ParameterFiles
+from sitl.link.memory_files import MemoryFiles
 from sitl.link.truth_log import TruthLog
 from sitl.link.udp import FleetLinks, run
 from sitl.settings import Settings
 from sitl.simulator import Simulator
 
 
-async def serve(simulator: Simulator, settings: Settings, files: ParameterFiles | None) -> None:
+async def serve(simulator: Simulator, settings: Settings, files: MemoryFiles | None) -> None:
     """Open the links, say so, and simulate; keep changed parameters if there are files for them.
 
     Raises:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from missions.lidar_packets import FIRST_PORT
 from sitl.errors import PortInUse
 from sitl.fleet import TICK_S
-from sitl.link.parameter_files import ParameterFiles
+from sitl.link.memory_files import MemoryFiles
 from sitl.link.truth_log import TruthLog
 from sitl.microservices.outbox import Link
 from sitl.settings import GCS_PORT, GROUND_PORT, Settings
@@ -148,7 +148,7 @@ def bind(host: str, port: int, purpose: str) -> socket.socket:
 
 
 async def run(
-    simulator: Simulator, links: FleetLinks, settings: Settings, log: TruthLog | None, files: ParameterFiles | None
+    simulator: Simulator, links: FleetLinks, settings: Settings, log: TruthLog | None, files: MemoryFiles | None
 ) -> None:
     """Advance the simulation at its speed for ever; collisions are reported on standard error."""
     loop = asyncio.get_running_loop()
