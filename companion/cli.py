@@ -28,10 +28,10 @@ from missions.faults import EXAMPLES, Fault, parse_fault
 from missions.frames import GeodeticPoint
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
+from missions.ports import companion_port
 
 T = TypeVar("T")
 
-FIRST_ONBOARD_PORT = 14540
 LARGEST_INSTANCE_BASE = 46715
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -64,7 +64,7 @@ def companion(
     Examples:  companion --vehicle 1 --mission indoor  |  companion --vehicle 2 --mission indoor --speed 5
     |  companion --vehicle 1 --mission field --system udpin://0.0.0.0:14540 --origin 47.397,8.545,489
     """
-    url = system or f"udpin://127.0.0.1:{FIRST_ONBOARD_PORT + vehicle - 1 + instance_base}"
+    url = system or f"udpin://127.0.0.1:{companion_port(vehicle) + instance_base}"
     try:
         settings = CompanionSettings(
             vehicle=vehicle, system_url=url, speed=speed, mode=mode, seed=seed, deadman_s=deadman_s

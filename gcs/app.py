@@ -165,6 +165,8 @@ class FlightApp:
         settings = self.settings
         self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in half a minute")
         options = ["--seed", str(settings.seed), "--truth", str(self.work_dir / TRUTH_FILE)]
+        for fault in settings.simulator_faults:
+            options += ["--fault", format_fault(fault)]
         return await processes.start("sitl", "sitl", settings.mission, *options, *self._common_options())
 
     async def _start_companions(self, processes: Processes) -> list[Child]:

@@ -18,7 +18,7 @@ from gcs.errors import GcsError, UsageError
 from gcs.link.url import parse_link_url
 from missions.errors import MissionError
 from missions.faults import EXAMPLES as FAULT_EXAMPLES
-from missions.faults import parse_fault
+from missions.faults import SIMULATOR_EXAMPLES, Fault, SimulatorFault, parse_any_fault
 from missions.frames import GeodeticPoint
 from missions.mission import Mission, load_mission, shipped_missions
 
@@ -63,7 +63,10 @@ def fly(
     host: Annotated[str, typer.Option(help="address of the web page; loopback only")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
     fault: Annotated[
-        list[str] | None, typer.Option(metavar="SPEC", help=f"something that goes wrong, such as {FAULT_EXAMPLES[0]}")
+        list[str] | None,
+        typer.Option(
+            metavar="SPEC", help=f"what goes wrong, such as {FAULT_EXAMPLES[0]} or {SIMULATOR_EXAMPLES[2]}; repeatable"
+        ),
     ] = None,
     instance_base: InstanceOption = 0,
 ) -> None:
@@ -83,6 +86,10 @@ def fly(
         raise UsageError("--sim starts the companions already: give one of --sim and --companions")
     if host not in {"127.0.0.1", "localhost", "::1"}:
         raise UsageError(f"--host {host}: the page is served on loopback only")
+    faults = [parse_any_fault(text) for text in fault or ()]
+    for one, text in zip(faults, fault or (), strict=True):
+        if not sim and isinstance(one, SimulatorFault):
+            raise UsageError(f"--fault {text}: the simulator makes it go wrong, which needs --sim")
     sources = {(True, False): chosen.Autopilots.SIMULATED, (False, True): chosen.Autopilots.COMPANIONS}
     settings = chosen.FlightSettings(
         mission=mission,
@@ -96,7 +103,8 @@ def fly(
         report_dir=report,
         host=host,
         port=port,
-        faults=tuple(parse_fault(text) for text in fault or ()),
+        faults=tuple(one for one in faults if isinstance(one, Fault)),
+        simulator_faults=tuple(one for one in faults if isinstance(one, SimulatorFault)),
         instance_base=instance_base,
     )
     raise typer.Exit(_run_flight(settings, load_mission(mission)))

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 
 from gcs.link.url import LinkUrl, Scheme
-from missions.faults import Fault
+from missions.faults import Fault, SimulatorFault
 from missions.frames import GeodeticPoint
 
 
@@ -57,6 +57,9 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     port: int = 8080
     faults: tuple[Fault, ...] = ()
+    """Of the companions."""
+    simulator_faults: tuple[SimulatorFault, ...] = ()
+    """Beside those of the mission."""
     instance_base: int = 0
 
     @property

@@ -179,11 +179,32 @@ def decode_simulator_fault(line: bytes) -> SimulatorFault:
         raise MissionError(f"control: {invalid}") from None
 
 
-def format_fault(fault: Fault) -> str:
-    """The text that `parse_fault` reads back."""
+def parse_any_fault(text: str) -> Fault | SimulatorFault:
+    """Read a fault of a companion or of the simulator as it is written on the command line.
+
+    Raises:
+        MissionError: naming what was expected and what was found.
+
+    Example:
+        >>> parse_any_fault("reboot:vehicle=1"), parse_any_fault("companion-kill:vehicle=1,at_s=4")
+        (Reboot(vehicle=1, at_s=None), CompanionKill(vehicle=1, at_s=4.0))
+    """
+    return _parsed(text, Fault | SimulatorFault, (EXAMPLES[0], SIMULATOR_EXAMPLES[0]))
+
+
+def format_fault(fault: Fault | SimulatorFault) -> str:
+    """The text that `parse_any_fault` reads back.
+
+    Example:
+        >>> format_fault(LinkFault(vehicle=1, loss=0.25))
+        'link:loss=0.25,link=ground,vehicle=1'
+    """
     fields = msgspec.to_builtins(fault)
+    defaults = {field.name: field.default for field in msgspec.structs.fields(fault)}
     kind = fields.pop("type")
-    return f"{kind}:" + ",".join(f"{key}={value:g}" for key, value in fields.items())
+    said = {key: value for key, value in fields.items() if value != defaults[key]}
+    texts = (f"{key}={value if isinstance(value, str) else f'{value:.12g}'}" for key, value in said.items())
+    return f"{kind}:" + ",".join(texts)
 
 
 def _parsed(text: str, kinds: Any, examples: tuple[str, ...]) -> Any:

@@ -17,6 +17,7 @@ from missions.faults import SIMULATOR_EXAMPLES, parse_simulator_fault
 from missions.frames import GeodeticPoint
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
+from missions.ports import FIRST_COMPANION_PORT
 from sitl.autopilot.memory import Memory, SigningMemory
 from sitl.autopilot.parameter_table import parameter_table
 from sitl.dynamics.airframe import AirframeName
@@ -26,7 +27,6 @@ from sitl.link.memory_files import MemoryFiles
 from sitl.open_field import open_field
 from sitl.service import serve
 from sitl.settings import (
-    COMPANION_PORT,
     HIGHEST_INSTANCE_BASE,
     HIGHEST_INSTANCE_BASE_WITH_LIDAR,
     HIGHEST_ONBOARD_PORT,
@@ -58,8 +58,8 @@ def fly(
     origin: Annotated[str | None, typer.Option(help="LAT,LON,ALT: move the mission there.")] = None,
     airframe: Annotated[AirframeName, typer.Option(help="The body of all vehicles.")] = AirframeName.X500_LIKE,
     onboard_ports: Annotated[
-        str, typer.Option(metavar="OWN:PEER", help="First ports of the onboard links and of the companions.")
-    ] = f"{ONBOARD_PORT}:{COMPANION_PORT}",
+        str | None, typer.Option(metavar="OWN:PEER", help="First ports of the onboard links and of the companions.")
+    ] = None,
     fault: Annotated[
         list[str] | None,
         typer.Option(metavar="SPEC", help=f"What goes wrong, e.g. {SIMULATOR_EXAMPLES[1]}; repeatable."),
@@ -81,13 +81,13 @@ def fly(
 ) -> None:
     """Simulate the vehicles of a mission, each an autopilot with PX4's manners on two UDP ports.
 
-    Vehicle i talks to the ground station on UDP 14550 from port 18570+(i-1), and to its companion on
-    14540+(i-1) from 14580+(i-1); --onboard-ports moves these. Faults can also be ordered while it runs, on
-    UDP 14990 as lines of JSON (docs/simulator.md). Ctrl-C ends it.
+    Vehicle i talks to the ground station on UDP 14550 from port 18570+(i-1), and from 14580+(i-1) to its
+    companion on 14540+(i-1), from the eleventh on 15050+(i-11); --onboard-ports moves these. Faults can also be
+    ordered while it runs, on UDP 14990 as lines of JSON (docs/simulator.md). Ctrl-C ends it.
     """
     if (mission is None) == (vehicles is None):
         raise typer.BadParameter("expected a MISSION or --vehicles, one of the two")
-    onboard_port, companion_port = _ports(onboard_ports)
+    onboard_port, first_companion_port = _ports(onboard_ports) if onboard_ports else (ONBOARD_PORT, None)
     if lidar and instance_base > HIGHEST_INSTANCE_BASE_WITH_LIDAR:
         highest = HIGHEST_INSTANCE_BASE_WITH_LIDAR
         raise typer.BadParameter(f"--instance-base: expected at most {highest} with --lidar, found {instance_base}")
@@ -99,7 +99,7 @@ def fly(
             instance_base=instance_base,
             airframe=airframe,
             onboard_port=onboard_port,
-            companion_port=companion_port,
+            first_companion_port=first_companion_port,
             faults=tuple(parse_simulator_fault(text) for text in fault or ()),
             signing_key=signing_key,
             parameters=parameters,
@@ -192,8 +192,8 @@ def _ports(text: str) -> tuple[int, int]:
     """
     own, _, peer = text.partition(":")
     if not all(port.isdecimal() and 1024 <= int(port) <= HIGHEST_ONBOARD_PORT for port in (own, peer)):
-        expected = f"expected two ports from 1024 to {HIGHEST_ONBOARD_PORT}"
-        raise typer.BadParameter(f"--onboard-ports: {expected}, as in {ONBOARD_PORT}:{COMPANION_PORT}, found {text!r}")
+        expected = f"two ports from 1024 to {HIGHEST_ONBOARD_PORT}, as in {ONBOARD_PORT}:{FIRST_COMPANION_PORT}"
+        raise typer.BadParameter(f"--onboard-ports: expected {expected}, found {text!r}")
     return int(own), int(peer)
 
 

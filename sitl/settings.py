@@ -5,10 +5,11 @@ from pathlib import Path
 
 from missions.faults import SimulatorFault
 from missions.lidar_packets import FIRST_PORT
+from missions.ports import companion_port
 from sitl.dynamics.airframe import AirframeName
 
 GROUND_PORT, GCS_PORT = 18570, 14550
-ONBOARD_PORT, COMPANION_PORT = 14580, 14540
+ONBOARD_PORT = 14580
 CONTROL_PORT = 14990
 """Where faults are ordered at run time."""
 HIGHEST_INSTANCE_BASE = 65535 - GROUND_PORT - 250
@@ -31,8 +32,8 @@ class Settings:
     airframe: AirframeName = AirframeName.X500_LIKE
     onboard_port: int = ONBOARD_PORT
     """Of the first vehicle's onboard link; the others' follow."""
-    companion_port: int = COMPANION_PORT
-    """Of the first vehicle's companion; the others' follow."""
+    first_companion_port: int | None = None
+    """Of the first vehicle's companion, if the others' shall follow it; the usual ones for None."""
     faults: tuple[SimulatorFault, ...] = ()
     """Beside those of the mission."""
     signing_key: Path | None = None
@@ -44,3 +45,8 @@ class Settings:
     supervised: bool = False
     """End when standard input does."""
     host: str = "127.0.0.1"
+
+    def companion_port(self, sysid: int) -> int:
+        """Where a vehicle's companion is, before the shift by `instance_base`."""
+        first = self.first_companion_port
+        return companion_port(sysid) if first is None else first + sysid - 1

@@ -99,14 +99,14 @@ class FleetLinks:
     def _ports(self) -> list[_Port]:
         """All ports to be opened.
 
-        The peer of an onboard link may be a port that is ours already, or the ground station's: with the usual ports,
-        that of vehicle 11 and those from 41 on. No companion can be there, and the link stays silent.
+        With `--onboard-ports` the peer of an onboard link may be a port that is ours already, or the ground station's:
+        no companion can be there, and the link stays silent.
         """
         settings, shift = self._settings, self._settings.instance_base
         sysids = list(self._simulator.vehicles)
         ground = [_Port(i, Link.GROUND, GROUND_PORT + i - 1 + shift, GCS_PORT + shift) for i in sysids]
-        own, peer = settings.onboard_port - 1 + shift, settings.companion_port - 1 + shift
-        onboard = [_Port(i, Link.ONBOARD, own + i, peer + i) for i in sysids]
+        own = settings.onboard_port - 1 + shift
+        onboard = [_Port(i, Link.ONBOARD, own + i, settings.companion_port(i) + shift) for i in sysids]
         taken = {port.own for port in ground + onboard} | {GCS_PORT + shift}
         return ground + [port._replace(peer=None) if port.peer in taken else port for port in onboard]
 

@@ -7,6 +7,8 @@ from contextlib import asynccontextmanager
 
 from mavsdk.asyncio.mavsdk import Configuration, Mavsdk
 
+from missions.ports import companion_port
+
 
 @asynccontextmanager
 async def companion(base: int, vehicle: int) -> AsyncIterator[tuple]:
@@ -14,7 +16,7 @@ async def companion(base: int, vehicle: int) -> AsyncIterator[tuple]:
     asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(16))
     library = Mavsdk(Configuration.create_manual(vehicle, 191, True))
     try:
-        await library.add_any_connection(f"udpin://127.0.0.1:{14540 + base + vehicle - 1}")
+        await library.add_any_connection(f"udpin://127.0.0.1:{companion_port(vehicle) + base}")
         yield library, await library.first_autopilot(10.0)
     finally:
         library.destroy()

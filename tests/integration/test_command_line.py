@@ -59,12 +59,20 @@ def test_a_broken_mission_file_is_named_with_its_line(tmp_path: Path):
         assert "Traceback" not in finished.output
 
 
+def test_a_fault_of_the_simulator_is_handed_to_it_and_its_complaint_is_handed_back():
+    ports = ("--instance-base", str(programs.instance_base()))
+    finished = programs.run("gcs", "fly", "indoor", "--sim", "--headless", "--fault", "reboot:vehicle=9", *ports)
+    assert finished.code == 2
+    assert "sitl: fault: vehicle: expected one of 1, 2, found 9" in finished.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
         (("fly", "nowhere", "--sim"), "no such file, and no shipped mission of that name"),
         (("fly", "indoor", "--sim", "--companions"), "give one of --sim and --companions"),
         (("fly", "indoor", "--sim", "--fault", "flood"), "--fault flood"),
+        (("fly", "indoor", "--companions", "--fault", "reboot:vehicle=1"), "reboot:vehicle=1: the simulator makes it"),
         (("fly", "indoor", "--sim", "--origin", "here,there"), "expected LAT,LON,ALT or `here`"),
         (("fly", "indoor", "--sim", "--origin", "91,0,0"), "expected LAT,LON,ALT or `here`"),
         (("fly", "indoor", "--sim", "--link", "carrier-pigeon"), "expected one of udpin://HOST:PORT"),

@@ -8,12 +8,14 @@ import socket
 import subprocess
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from missions.lidar_packets import unpack
+from missions.ports import companion_port
 from sitl.dialect import mavlink
 from tests.integration.sitl_process import SITL, GroundStation, free_instance_base, running_sitl
 
@@ -137,9 +139,23 @@ def test_garbage_on_its_ports_does_no_harm(base, ground):
         assert ground.until(lambda: ground.last("COMMAND_ACK")).result == 0
 
 
+def test_every_one_of_a_hundred_vehicles_has_its_companions_port(base):
+    sysids = 1, 10, 11, 41, 100
+    ends = {sysid: socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for sysid in sysids}
+    with ExitStack() as stack:
+        for sysid, end in ends.items():
+            stack.enter_context(end)
+            end.bind(("127.0.0.1", companion_port(sysid) + base))
+            end.settimeout(10.0)
+        stack.enter_context(running_sitl("--vehicles", "100", base=base))
+        for sysid, end in ends.items():
+            frame, sender = end.recvfrom(2048)
+            assert (frame[5], sender[1]) == (sysid, 14580 + sysid - 1 + base)
+
+
 def test_a_companions_port_that_is_taken_by_the_simulator_or_the_ground_gets_nothing(base):
-    """By the usual ports, that of vehicle 11 is the ground station's, that of vehicle 41 vehicle 1's own."""
-    with running_sitl("--vehicles", "41", base=base):
+    """By these ports, that of vehicle 11 is the ground station's, that of vehicle 41 vehicle 1's own."""
+    with running_sitl("--vehicles", "41", "--onboard-ports", "14580:14540", base=base):
         station = GroundStation(base)
         try:
             station.until(lambda: station.last("HEARTBEAT", 41))

@@ -2,10 +2,12 @@
 
 import itertools
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import missions
 from missions.errors import MissionError
 from missions.faults import (
     BatteryLevel,
@@ -18,9 +20,11 @@ from missions.faults import (
     SimulatedLink,
     Weather,
     decode_simulator_fault,
+    format_fault,
+    parse_any_fault,
     parse_simulator_fault,
 )
-from missions.mission import LinkSettings
+from missions.mission import LinkSettings, load_mission
 from sitl.dialect import mavlink
 from sitl.link.control_port import obey
 from sitl.link.faulty_link import Direction, FaultyLink
@@ -299,6 +303,51 @@ def test_the_control_port_obeys_line_by_line_and_answers_each():
     assert flown.run(0.02).autopilot.battery.remaining == 0.4
 
 
+EVERY_FAULT = [
+    {"type": "link", "vehicle": 1, "loss": 0.5},
+    {"type": "link", "vehicle": 1, "delay_s": 0.3},
+    {"type": "link", "link": "ground", "jitter_s": 0.4},
+    {"type": "link", "duplicates": 0.5},
+    {"type": "link", "reorder": 0.5},
+    {"type": "link", "bandwidth_bytes_s": 800},
+    {"type": "link", "blackout_s": 0.7},
+    {"type": "gps-loss", "vehicle": 1, "duration_s": 1},
+    {"type": "motor-failure", "vehicle": 1, "motor": 2, "health": 0.4},
+    {"type": "battery", "remaining": 0.3},
+    {"type": "sensor-noise", "horizontal_std_m": 2, "vertical_std_m": 2, "velocity_std_m_s": 1},
+    {"type": "weather", "east_m_s": 5, "gust_std_m_s": 2},
+    {"type": "reboot", "vehicle": 1},
+]
+
+
+def flight_with(order: dict | None, way: str, tmp_path: Path) -> tuple:
+    """Where a vehicle is and what it has said, a second and a half after a fault in its first flight."""
+    text = (Path(missions.__file__).parent / "field.yaml").read_text()
+    file = tmp_path / "faulty.yaml"
+    file.write_text(text + f"  faults: {json.dumps([order])}\n" if order and way == "mission file" else text)
+    flown = Flown(load_mission(str(file)), seed=3)
+    if order and way == "command line":
+        kind, *fields = order.values()
+        pairs = zip(list(order)[1:], fields, strict=True)
+        flown.simulator.order(parse_simulator_fault(f"{kind}:" + ",".join(f"{key}={value}" for key, value in pairs)))
+    if order and way == "control port":
+        assert json.loads(obey(flown.simulator, json.dumps(order).encode()))["ok"]
+    flown.boot().command(22, *[NAN] * 7)
+    flown.command(400, 1)
+    flown.run(4.0)
+    return tuple(flown.position), flown.autopilot.battery.remaining, flown.heard(Link.GROUND)
+
+
+@pytest.mark.parametrize("fault", EVERY_FAULT, ids=lambda fault: f"{fault['type']} {list(fault)[-1]}")
+def test_every_fault_acts_and_the_same_whichever_way_it_is_ordered(fault, tmp_path):
+    timed = {**fault, "at_s": 0.5}
+    by_file, by_line, at_run_time = (
+        flight_with(timed, way, tmp_path) for way in ("mission file", "command line", "control port")
+    )
+    assert by_file == by_line == at_run_time
+    assert by_file != flight_with(None, "", tmp_path)
+
+
 def test_a_mission_that_faults_a_vehicle_that_it_does_not_have_is_refused():
     with pytest.raises(MissionError, match="expected one of 1, 2, found 3"):
         Flown(field(2, faults=(Reboot(vehicle=3),)))
@@ -321,6 +370,7 @@ def test_faults_are_written_on_the_command_line_and_as_json(text, fault):
         for key, value in (p.split("=") for p in rest.split(","))
     }
     assert decode_simulator_fault(json.dumps({"type": kind, **fields}).encode()) == fault
+    assert parse_any_fault(format_fault(fault)) == fault
 
 
 @pytest.mark.parametrize(
