@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 MAVPROXY = Path(sys.executable).with_name("mavproxy.py")
-MODULES = "wp,rally,fence,param,arm,mode,cmdlong,misc,message"
+MODULES = "wp,rally,fence,param,arm,mode,cmdlong,misc,message,signing"
 
 
 class MavproxySession:
@@ -18,9 +18,11 @@ class MavproxySession:
 
     Args:
         process: the program, its output not blocking.
+        folder: where it writes.
     """
 
-    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+    def __init__(self, process: subprocess.Popen[bytes], folder: Path) -> None:
+        self.folder = folder
         self._process = process
         self._printed = ""
         self._seen = 0
@@ -69,7 +71,7 @@ def running_mavproxy(port: int, folder: Path) -> Iterator[MavproxySession]:
     """MAVProxy on a UDP port of this machine, its files in `folder`, ended with the block."""
     command = [str(MAVPROXY), f"--master=udpin:127.0.0.1:{port}", f"--default-modules={MODULES}"]
     process = subprocess.Popen(
-        [*command, f"--state-basedir={folder}", "--no-state"],
+        [*command, f"--state-basedir={folder}", "--aircraft=simulated"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -78,7 +80,7 @@ def running_mavproxy(port: int, folder: Path) -> Iterator[MavproxySession]:
     )
     os.set_blocking(process.stdout.fileno(), False)
     try:
-        yield MavproxySession(process)
+        yield MavproxySession(process, folder)
     finally:
         process.stdin.close()
         try:

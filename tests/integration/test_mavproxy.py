@@ -5,10 +5,12 @@ and `position` are of no use with a PX4 (docs/compatibility.md); what an operato
 """
 
 import time
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pymavlink import mavutil
 
 from tests.integration.mavproxy_session import MavproxySession, running_mavproxy
 from tests.integration.sitl_process import free_instance_base, running_sitl
@@ -199,3 +201,44 @@ def test_orders_that_a_px4_does_not_take_are_refused_in_words(mavproxy):
     mavproxy.ask("arm throttle", r"COMPONENT_ARM_DISARM: TEMPORARILY_REJECTED[\s\S]*Arming denied")
     mavproxy.ask(HOLD, r"DO_SET_MODE: ACCEPTED")
     mavproxy.ask("velocity 1 0 0", r"force not supported")
+
+
+def test_parameters_are_saved_compared_and_loaded(mavproxy):
+    set_parameter(mavproxy, "MPC_XY_CRUISE", 5.0)
+    mavproxy.ask("param save all.parm", r"Saved \d+ parameters")
+    set_parameter(mavproxy, "MPC_XY_CRUISE", 4.0)
+    mavproxy.ask("param diff all.parm", r"MPC_XY_CRUISE\s+4\.0+\s+5\.0")
+    mavproxy.ask("param load all.parm", r"\(changed 1\)")
+    mavproxy.ask("param fetch MPC_XY_CRUISE", r"MPC_XY_CRUISE = 5\.0")
+
+
+def test_a_mission_is_edited(mavproxy):
+    mavproxy.ask("wp load plan.txt", r"TYPE_MISSION: ACCEPTED")
+    mavproxy.ask("wp list", r"Saved waypoints")
+    mavproxy.ask("wp remove 2", r"Sent all 3 waypoints[\s\S]*TYPE_MISSION: ACCEPTED")
+    mavproxy.ask("wp list", r"Requesting 3 waypoints[\s\S]*Saved waypoints")
+    mavproxy.ask("wp undo", r"Sent all 4 waypoints[\s\S]*TYPE_MISSION: ACCEPTED")
+    mavproxy.ask("wp clear", r"TYPE_MISSION: ACCEPTED")
+
+
+def test_a_reboot_is_followed_by_the_same_session(mavproxy):
+    mavproxy.ask("reboot", r"PREFLIGHT_REBOOT_SHUTDOWN: ACCEPTED")
+    mavproxy.until("ATTITUDE", "time_boot_ms", 600, 20_000)
+    mavproxy.ask("param fetch MPC_XY_CRUISE", r"MPC_XY_CRUISE = \d")
+
+
+def test_its_recording_can_be_read_again(mavproxy):
+    (path,) = mavproxy.folder.rglob("*.tlog")
+    mavproxy.ask("long REQUEST_MESSAGE 148", r"REQUEST_MESSAGE: ACCEPTED")
+    recording = mavutil.mavlink_connection(str(path), dialect="development")
+    kinds = Counter(message.get_type() for message in iter(recording.recv_match, None))
+    recording.close()
+    assert kinds["BAD_DATA"] == 0
+    assert min(kinds["HEARTBEAT"], kinds["ATTITUDE"], kinds["PARAM_VALUE"], kinds["COMMAND_ACK"]) > 0
+
+
+def test_signing_is_set_up_and_the_link_goes_on(mavproxy):
+    """Last: what is signed from here on stays so."""
+    mavproxy.ask("signing setup a phrase", r"Setup signing key")
+    mavproxy.ask("param fetch MPC_XY_CRUISE", r"MPC_XY_CRUISE = \d")
+    assert int(mavproxy.value("HEARTBEAT", "base_mode")) & 128 == 0

@@ -2,21 +2,30 @@
 
 import asyncio
 import math
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 import pytest
 from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.calibration import CalibrationAsync
+from mavsdk.asyncio.plugins.ftp import FtpAsync
 from mavsdk.asyncio.plugins.geofence import GeofenceAsync
+from mavsdk.asyncio.plugins.log_files import LogFilesAsync
 from mavsdk.asyncio.plugins.manual_control import ManualControlAsync
 from mavsdk.asyncio.plugins.mission import MissionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins import mission_raw
+from mavsdk.plugins.action import Action, ActionError, RelayCommand
+from mavsdk.plugins.calibration import CalibrationError
+from mavsdk.plugins.ftp import FtpError
 from mavsdk.plugins.geofence import Circle, FenceType, GeofenceData, Point, Polygon
+from mavsdk.plugins.log_files import LogFilesError
 from mavsdk.plugins.mission import MissionItem, MissionPlan
 from mavsdk.plugins.offboard import (
     AccelerationNed,
@@ -27,7 +36,8 @@ from mavsdk.plugins.offboard import (
     VelocityBodyYawspeed,
     VelocityNedYaw,
 )
-from mavsdk.plugins.telemetry import FlightMode
+from mavsdk.plugins.param import ParamError
+from mavsdk.plugins.telemetry import FlightMode, LandedState, Telemetry
 
 from tests.integration.mavsdk_companion import companion, until
 from tests.integration.sitl_process import free_instance_base, running_sitl
@@ -42,7 +52,7 @@ RALLY_ITEM = mission_raw.MissionItem(0, 6, 5100, 1, 1, 0, 0, 0, 0, 473978332, 85
 @pytest.fixture(scope="module")
 def base() -> Iterator[int]:
     shift = free_instance_base()
-    with running_sitl("--vehicles", "7", "--speed", "5", base=shift):
+    with running_sitl("--vehicles", "10", "--speed", "5", base=shift):
         yield shift
 
 
@@ -271,3 +281,67 @@ async def test_orders_of_the_action_plugin_and_a_failsafe(base):
             return not await f.telemetry.armed()
 
         await until(is_disarmed)
+
+
+async def test_what_is_not_there_is_refused_at_once(base):
+    """Files, logs, calibration, relays and a transition are all answered in the time of one message."""
+    async with companion(base, 8) as (_, system):
+        action, telemetry = ActionAsync(system), TelemetryAsync(system)
+        await until(telemetry.health_all_ok)
+        began_s = time.monotonic()
+        for asked, error, said in (
+            (FtpAsync(system).list_directory("/"), FtpError, "UNSUPPORTED"),
+            (LogFilesAsync(system).get_entries(), LogFilesError, "NO_LOGFILES"),
+            (action.set_relay(0, RelayCommand.ON), ActionError, "UNSUPPORTED"),
+            (action.transition_to_fixedwing(), ActionError, "NO_VTOL_TRANSITION_SUPPORT"),
+            (action.terminate(), ActionError, "COMMAND_DENIED"),
+            (ParamAsync(system).get_param_int("MPC_XY_CRUISE"), ParamError, "WRONG_TYPE"),
+        ):
+            with pytest.raises(error, match=said):
+                await asked
+        with pytest.raises(CalibrationError, match="UNSUPPORTED"):
+            async for _ in CalibrationAsync(system).calibrate_gyro():
+                pass
+        assert time.monotonic() - began_s < 2.0
+
+
+async def test_rates_can_be_set_for_all_that_a_px4_streams(base):
+    async with companion(base, 9) as (_, system):
+        telemetry = TelemetryAsync(system)
+        await until(telemetry.health_all_ok)
+        await telemetry.set_rate_distance_sensor(5.0)
+        await telemetry.set_rate_scaled_imu(5.0)
+        await telemetry.set_rate_battery(25.0)
+        batteries = telemetry.subscribe_battery()
+        async with asyncio.timeout(10.0):
+            for _ in range(20):
+                assert (await anext(batteries)).voltage_v == pytest.approx(16.2, abs=0.1)
+
+
+def test_the_synchronous_interface_takes_off_and_lands(base):
+    library = Mavsdk(Configuration.create_manual(10, 191, True))
+    try:
+        library.add_any_connection(f"udpin://127.0.0.1:{14549 + base}")
+        system = library.first_autopilot(10.0)
+        action, telemetry = Action(system), Telemetry(system)
+        landed_states = []
+        telemetry.subscribe_landed_state(lambda state, _: landed_states.append(state))
+        patiently(telemetry.health_all_ok)
+        action.set_takeoff_altitude(3.0)
+        assert action.get_takeoff_altitude() == 3.0
+        action.arm()
+        action.takeoff()
+        patiently(lambda: telemetry.position().relative_altitude_m > 2.5)
+        action.land()
+        patiently(lambda: not telemetry.armed())
+        assert {LandedState.TAKING_OFF, LandedState.LANDING, LandedState.ON_GROUND} <= set(landed_states)
+    finally:
+        library.destroy()
+
+
+def patiently(holds: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    deadline_s = time.monotonic() + 20.0
+    while not holds():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.05)
