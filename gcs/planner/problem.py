@@ -10,7 +10,7 @@ from gcs.planner import limits
 from gcs.planner.coupling import Coupling
 from gcs.planner.curve_cost import Terms, sampling
 from gcs.planner.fleet_cost import Problem
-from gcs.planner.representation import LEG_SEGMENTS, Guide, guide_along, pin_weights
+from gcs.planner.representation import LEG_SEGMENTS, Guide, guide_along, pin_weights, straight_legs
 from missions import obstacles, time_law
 from missions.mission import Mission, Target
 
@@ -102,7 +102,12 @@ def guides_along(mission: Mission, ways: Sequence[Way], n_control: int) -> list[
 def guides(mission: Mission, routes: Sequence[Route]) -> list[Guide]:
     """Guides that lead straight from target to target."""
     ways = [route.straight for route in routes]
-    return guides_along(mission, ways, control_points(mission, ways))
+    n_control = control_points(mission, ways)
+    if any(way.stops for way in ways):
+        return guides_along(mission, ways, n_control)
+    begins_m, ends_m = np.array([way.corners_m for way in ways]).transpose(1, 0, 2)
+    bases_m, axes_m = straight_legs(begins_m, ends_m, n_control, mission.world.bounds)
+    return [Guide(*each, pins=np.zeros(0, np.int64)) for each in zip(bases_m, axes_m, strict=True)]
 
 
 def control_points(mission: Mission, ways: Sequence[Way], per_corner: int = 0) -> int:
