@@ -211,10 +211,15 @@ def _joining(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) ->
 
 
 def _way_to_curve(mission: Mission, vehicle: TimedCurve, joined: BoolArray) -> Array:
-    """(`JOINING_SAMPLES`, 3) places from the hover above the pad to the first sample at which the curve is joined."""
+    """(`JOINING_SAMPLES`, 3) places from the hover above the pad to where the curve is joined."""
     pad_m = np.array(mission.vehicle(vehicle.sysid).pad_m)
     hover_m = pad_m + np.array([0.0, 0.0, mission.takeoff_height_m])
-    at_m = vehicle.curve_m[int(np.argmax(joined))] if joined.any() else vehicle.curve_m[-1]
+    at_m = vehicle.curve_m[-1]
+    if joined.any():
+        before_m, behind_m = vehicle.curve_m[(first := int(np.argmax(joined))) - 1 : first + 1]
+        away_m = lengths(np.stack((before_m, behind_m)) - vehicle.curve_m[0])
+        share = (join_distance_m(mission) - away_m[0]) / (away_m[1] - away_m[0])
+        at_m = before_m + share * (behind_m - before_m)
     return hover_m + np.linspace(0.0, 1.0, JOINING_SAMPLES)[:, None] * (at_m - hover_m)
 
 

@@ -10,6 +10,7 @@ from gcs.planner import limits
 from gcs.planner.coupling import Coupling
 from gcs.planner.curve_cost import Terms, sampling
 from gcs.planner.fleet_cost import Problem
+from gcs.planner.joining import Joining
 from gcs.planner.representation import LEG_SEGMENTS, Guide, guide_along, pin_weights, straight_legs
 from missions import obstacles, time_law
 from missions.mission import Mission, Target
@@ -136,6 +137,7 @@ def pose(mission: Mission, routes: Sequence[Route], guides: Sequence[Guide], car
         samples=sampling(n_control, care.samples * -(-n_control // MOST_CONTROL_POINTS)),
         terms=_terms(mission, routes, care),
         coupling=_coupling(mission, routes, care),
+        joining=_joining(mission, routes, care),
         obstacles=obstacles.pack(mission.world.as_known()),
     )
 
@@ -189,6 +191,15 @@ def _coupling(mission: Mission, routes: Sequence[Route], care: Care) -> Coupling
         mean_unit_m=MEAN_UNIT_SHARE * min(mean_high_m, _mean_direct_m(routes)),
         first=first,
         last=last,
+    )
+
+
+def _joining(mission: Mission, routes: Sequence[Route], care: Care) -> Joining:
+    pads_m = [mission.vehicle(route.sysid).pad_m for route in routes if mission.launch_point_m is not None]
+    return Joining(
+        hovers_m=np.array(pads_m, dtype=float).reshape(-1, 3) + np.array([0.0, 0.0, mission.takeoff_height_m]),
+        distance_m=limits.join_distance_m(mission),
+        contact_m=2.0 * mission.limits.body_radius_m * (1.0 + care.distance_share),
     )
 
 

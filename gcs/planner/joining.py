@@ -1,0 +1,153 @@
+"""Contact on the way from pads to curves that begin in one launch point, as the search sees it, with derivatives.
+
+All vehicles fly straight from their hovers to where they have joined their curves, at equal shares of the way at the
+same time (`feasibility` judges the same, apart from this). A curve is joined where it is `distance_m` away from its
+beginning; between two samples it is the cubic that has their places and slopes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.planner.curve_cost import Adjoint, Sampling
+from missions.kernels import compiled
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+HALVINGS = 40
+"""Of the step between two samples, when the place is looked for at which a curve is joined."""
+
+
+class Joining(NamedTuple):
+    """Where vehicles come from, and what they keep on their way to their curves."""
+
+    hovers_m: Array
+    """(vehicles, 3) above their pads; nobody's, (0, 3), where vehicles begin at their own places."""
+    distance_m: float
+    """How far from its beginning a curve is joined."""
+    contact_m: float
+    """Two vehicles that are nearer are in contact."""
+
+
+@compiled
+def join(
+    control_m: Array, samples: Sampling, points_m: Array, distance_m: float, at_m: Array, slopes_m: Array
+) -> tuple[int, float]:
+    """Fill `at_m` with the place where a curve is joined.
+
+    Args:
+        control_m: (n, 3) control points, ENU [m].
+        samples: the m samples.
+        points_m: (m, 3) the curve there.
+        distance_m: from the curve's beginning.
+        at_m: (3,) the place; the end of a curve that does not get that far.
+        slopes_m: (2, 3) is filled with the derivatives at the samples before and behind it, per step of the samples.
+
+    Returns:
+        The sample before the place, and the share of the step to the next one; -1 and 0 for a curve that ends before.
+    """
+    last, behind = len(points_m) - 1, 1
+    at_m[:] = points_m[last]
+    while behind <= last and _away(points_m[behind], points_m[0]) <= distance_m:
+        behind += 1
+    if behind > last:
+        return -1, 0.0
+    for side in range(2):
+        m = behind - 1 + side
+        for axis in range(3):
+            slopes_m[side, axis] = 0.0
+            for k in range(4):
+                slopes_m[side, axis] += samples.slope[m, k] * control_m[samples.first[m] + k, axis] / last
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        t = 0.5 * (low + high)
+        _between(points_m, behind - 1, slopes_m, t, at_m)
+        if _away(at_m, points_m[0]) > distance_m:
+            high = t
+        else:
+            low = t
+    return behind - 1, t
+
+
+@compiled
+def in_contact(
+    joining: Joining, a: int, a_m: Array, b: int, b_m: Array, pull: float, by_a: Array, by_b: Array
+) -> float:
+    """Squared violation by vehicles a and b, which join their curves at (3,) places; `pull` times derivatives added."""
+    squared = along = 0.0
+    for axis in range(3):
+        begin = joining.hovers_m[a, axis] - joining.hovers_m[b, axis]
+        way = a_m[axis] - b_m[axis] - begin
+        squared, along = squared + way * way, along - begin * way
+    t = min(max(along / max(squared, 1e-12), 0.0), 1.0)
+    squared = 0.0
+    for axis in range(3):
+        begin = joining.hovers_m[a, axis] - joining.hovers_m[b, axis]
+        squared += (begin + t * (a_m[axis] - b_m[axis] - begin)) ** 2
+    apart_m = np.sqrt(squared)
+    if apart_m >= joining.contact_m:
+        return 0.0
+    short = 1.0 - apart_m / joining.contact_m
+    if pull > 0.0:
+        scale = -2.0 * pull * short / joining.contact_m / max(apart_m, 1e-9) * t
+        for axis in range(3):
+            begin = joining.hovers_m[a, axis] - joining.hovers_m[b, axis]
+            push = scale * (begin + t * (a_m[axis] - b_m[axis] - begin))
+            by_a[axis] += push
+            by_b[axis] -= push
+    return short * short
+
+
+@compiled
+def from_join(
+    points_m: Array, at_m: Array, before: int, t: float, slopes_m: Array, by_at: Array, adjoint: Adjoint
+) -> None:
+    """Add what a (3,) derivative by the place where a curve is joined means for the curve's samples.
+
+    The place keeps its distance from the beginning: what would move it away is taken back along the curve.
+    """
+    moved, last = np.empty(3), len(points_m) - 1
+    _along(points_m, before, slopes_m, t, moved)
+    outwards, pulled = 0.0, 0.0
+    for axis in range(3):
+        outwards += moved[axis] * (at_m[axis] - points_m[0, axis])
+        pulled += moved[axis] * by_at[axis]
+    weights = _weights(t)
+    for axis in range(3):
+        by_place = by_at[axis] - (at_m[axis] - points_m[0, axis]) * pulled / max(outwards, 1e-9)
+        adjoint.point[before, axis] += weights[0] * by_place
+        adjoint.point[before + 1, axis] += weights[1] * by_place
+        adjoint.slope[before, axis] += weights[2] * by_place / last
+        adjoint.slope[before + 1, axis] += weights[3] * by_place / last
+
+
+@compiled
+def _weights(t: float) -> tuple[float, float, float, float]:
+    """What two places and their slopes weigh in the cubic between them."""
+    return (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2, t * t * (t - 1.0)
+
+
+@compiled
+def _between(points_m: Array, before: int, slopes_m: Array, t: float, out_m: Array) -> None:
+    """Fill (3,) with the place at share t of the step from a sample to the next."""
+    weights = _weights(t)
+    for axis in range(3):
+        out_m[axis] = weights[0] * points_m[before, axis] + weights[1] * points_m[before + 1, axis]
+        out_m[axis] += weights[2] * slopes_m[0, axis] + weights[3] * slopes_m[1, axis]
+
+
+@compiled
+def _along(points_m: Array, before: int, slopes_m: Array, t: float, out: Array) -> None:
+    """Fill (3,) with the derivative of `_between` by t."""
+    for axis in range(3):
+        step_m = points_m[before + 1, axis] - points_m[before, axis]
+        out[axis] = 6.0 * t * (1.0 - t) * step_m
+        out[axis] += (1.0 - t) * (1.0 - 3.0 * t) * slopes_m[0, axis] + t * (3.0 * t - 2.0) * slopes_m[1, axis]
+
+
+@compiled
+def _away(a_m: Array, b_m: Array) -> float:
+    east, north, up = a_m[0] - b_m[0], a_m[1] - b_m[1], a_m[2] - b_m[2]
+    return np.sqrt(east * east + north * north + up * up)
