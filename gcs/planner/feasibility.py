@@ -201,7 +201,10 @@ def _joining(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) ->
     """
     if mission.launch_point_m is None:
         return
-    places_m = np.array([_way_to_curve(mission, *each) for each in zip(vehicles, fleet.joined, strict=True)])
+    distance_m = join_distance_m(mission)
+    places_m = np.array(
+        [_way_to_curve(mission, *each, distance_m) for each in zip(vehicles, fleet.joined, strict=True)]
+    )
     contact_m = 2.0 * mission.limits.body_radius_m
     for i, vehicle in enumerate(vehicles):
         nearest_m = lengths(places_m[i + 1 :] - places_m[i]).min(axis=1)
@@ -210,7 +213,7 @@ def _joining(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) ->
             yield Violation(vehicle.name, Limit.SEPARATION, where, float(nearest_m[j]), contact_m)
 
 
-def _way_to_curve(mission: Mission, vehicle: TimedCurve, joined: BoolArray) -> Array:
+def _way_to_curve(mission: Mission, vehicle: TimedCurve, joined: BoolArray, distance_m: float) -> Array:
     """(`JOINING_SAMPLES`, 3) places from the hover above the pad to where the curve is joined."""
     pad_m = np.array(mission.vehicle(vehicle.sysid).pad_m)
     hover_m = pad_m + np.array([0.0, 0.0, mission.takeoff_height_m])
@@ -218,7 +221,7 @@ def _way_to_curve(mission: Mission, vehicle: TimedCurve, joined: BoolArray) -> A
     if joined.any():
         before_m, behind_m = vehicle.curve_m[(first := int(np.argmax(joined))) - 1 : first + 1]
         away_m = lengths(np.stack((before_m, behind_m)) - vehicle.curve_m[0])
-        share = (join_distance_m(mission) - away_m[0]) / (away_m[1] - away_m[0])
+        share = (distance_m - away_m[0]) / (away_m[1] - away_m[0])
         at_m = before_m + share * (behind_m - before_m)
     return hover_m + np.linspace(0.0, 1.0, JOINING_SAMPLES)[:, None] * (at_m - hover_m)
 

@@ -109,7 +109,7 @@ def swarm_cost(
     control, zones_m = np.empty_like(problem.base_m[vehicle]), problem.zones_m[vehicle]
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
     places, side, share = np.empty((n_fractions, 3)), np.empty(n_fractions, np.int64), np.empty(n_fractions)
-    at_m, slopes_m, joining = np.empty(3), np.empty((2, 3)), problem.joining
+    at_m, join_weights, join_slopes, joining = np.empty(3), np.empty(4), np.empty(3), problem.joining
     unwanted = new_adjoint(0)
     for i in range(len(offsets)):
         control_points(problem, vehicle, offsets[i], control)
@@ -120,7 +120,7 @@ def swarm_cost(
             step = at_fractions(points, chords, places, side, share)
             violation[i] += _towards_others(problem.coupling, vehicle, places, step, context)
             if len(joining.hovers_m) > 0:
-                join(control, problem.samples, points, joining.distance_m, at_m, slopes_m)
+                join(control, problem.samples, points, joining.distance_m, at_m, join_weights, join_slopes)
                 for other in range(len(context.joins_m)):
                     if other != vehicle:
                         violation[i] += in_contact(
@@ -137,7 +137,8 @@ def set_context(problem: Problem, vehicle: int, offsets: Array, context: Context
     place_samples(control, problem.samples, points, chords)
     places, side, share = context.places_m[vehicle], np.empty(n_fractions, np.int64), np.empty(n_fractions)
     context.steps_m[vehicle] = at_fractions(points, chords, places, side, share)
-    join(control, problem.samples, points, problem.joining.distance_m, context.joins_m[vehicle], np.empty((2, 3)))
+    joined_m, join_weights, join_slopes = context.joins_m[vehicle], np.empty(4), np.empty(3)
+    join(control, problem.samples, points, problem.joining.distance_m, joined_m, join_weights, join_slopes)
     for other in range(len(context.places_m)):
         if other != vehicle:
             mean = mean_distance(places, context.places_m[other])
@@ -162,7 +163,11 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
     side, share = np.empty((n_vehicles, n_fractions), np.int64), np.empty((n_vehicles, n_fractions))
     steps = np.empty(n_vehicles)
     joins, by_join = np.empty((n_vehicles, 3)), np.zeros((n_vehicles, 3))
-    before, within, slopes = np.empty(n_vehicles, np.int64), np.empty(n_vehicles), np.empty((n_vehicles, 2, 3))
+    before, join_weights, join_slopes = (
+        np.empty(n_vehicles, np.int64),
+        np.empty((n_vehicles, 4)),
+        np.empty((n_vehicles, 3)),
+    )
     joined_from_pads = len(problem.joining.hovers_m) > 0 and n_vehicles > 1
     objective = violation = 0.0
     for i in range(n_vehicles):
@@ -181,8 +186,14 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
         objective, violation = objective + cost, violation + broken
         steps[i] = at_fractions(points[i], chords[i], places[i], side[i], share[i])
         if joined_from_pads:
-            before[i], within[i] = join(
-                control, problem.samples, points[i], problem.joining.distance_m, joins[i], slopes[i]
+            before[i] = join(
+                control,
+                problem.samples,
+                points[i],
+                problem.joining.distance_m,
+                joins[i],
+                join_weights[i],
+                join_slopes[i],
             )
     if n_vehicles > 1:
         violation += _between_all(problem.coupling, problem.terms.penalty_weight, places, steps, by_place)
@@ -192,7 +203,7 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
         from_fractions(points[i], chords[i], side[i], share[i], by_place[i], by_point[i], by_chord[i])
         adjoint = Adjoint(by_point[i], by_slope[i], by_bend[i], by_chord[i])
         if joined_from_pads and before[i] >= 0:
-            from_join(points[i], joins[i], before[i], within[i], slopes[i], by_join[i], adjoint)
+            from_join(points[i], joins[i], before[i], join_weights[i], join_slopes[i], by_join[i], adjoint)
         pull_back(problem.samples, points[i], chords[i], adjoint, control)
         _to_offsets(control, problem.axes_m[i], problem.pins[i], problem.pin_weights, gradient[i])
     return objective, violation
@@ -213,7 +224,8 @@ def plan_costs(problem: Problem, controls_m: Array, objective: Array, violation:
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
     places, unused = np.empty((n_vehicles, n_fractions, 3)), np.zeros((n_vehicles, n_fractions, 3))
     side, share, steps = np.empty(n_fractions, np.int64), np.empty(n_fractions), np.empty(n_vehicles)
-    joins, by_join, slopes = np.empty((n_vehicles, 3)), np.zeros((n_vehicles, 3)), np.empty((2, 3))
+    joins, by_join = np.empty((n_vehicles, 3)), np.zeros((n_vehicles, 3))
+    join_weights, join_slopes = np.empty(4), np.empty(3)
     joined_from_pads = len(problem.joining.hovers_m) > 0 and n_vehicles > 1
     unwanted = new_adjoint(0)
     for plan in range(n_plans):
@@ -232,7 +244,15 @@ def plan_costs(problem: Problem, controls_m: Array, objective: Array, violation:
             objective[plan], violation[plan] = objective[plan] + cost, violation[plan] + broken
             steps[i] = at_fractions(points, chords, places[i], side, share)
             if joined_from_pads:
-                join(controls_m[plan, i], problem.samples, points, problem.joining.distance_m, joins[i], slopes)
+                join(
+                    controls_m[plan, i],
+                    problem.samples,
+                    points,
+                    problem.joining.distance_m,
+                    joins[i],
+                    join_weights,
+                    join_slopes,
+                )
         if n_vehicles > 1:
             violation[plan] += _between_all(problem.coupling, 0.0, places, steps, unused)
         if joined_from_pads:

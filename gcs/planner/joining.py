@@ -33,8 +33,8 @@ class Joining(NamedTuple):
 
 @compiled
 def join(
-    control_m: Array, samples: Sampling, points_m: Array, distance_m: float, at_m: Array, slopes_m: Array
-) -> tuple[int, float]:
+    control_m: Array, samples: Sampling, points_m: Array, distance_m: float, at_m: Array, weights: Array, along: Array
+) -> int:
     """Fill `at_m` with the place where a curve is joined.
 
     Args:
@@ -43,32 +43,44 @@ def join(
         points_m: (m, 3) the curve there.
         distance_m: from the curve's beginning.
         at_m: (3,) the place; the end of a curve that does not get that far.
-        slopes_m: (2, 3) is filled with the derivatives at the samples before and behind it, per step of the samples.
+        weights: (4,) is filled with what the samples before and behind it, and then the derivatives there, weigh in it.
+        along: (3,) is filled with the curve's direction there.
 
     Returns:
-        The sample before the place, and the share of the step to the next one; -1 and 0 for a curve that ends before.
+        The sample before the place; -1 for a curve that ends before, for which nothing but the place is filled in.
     """
-    last, behind = len(points_m) - 1, 1
-    at_m[:] = points_m[last]
-    while behind <= last and _away(points_m[behind], points_m[0]) <= distance_m:
+    last, behind, low, high = len(points_m) - 1, 0, 0.0, 1.0
+    away_m = 0.0
+    while behind < last and away_m <= distance_m:
         behind += 1
-    if behind > last:
-        return -1, 0.0
-    for side in range(2):
-        m = behind - 1 + side
+        away_m = 0.0
         for axis in range(3):
-            slopes_m[side, axis] = 0.0
-            for k in range(4):
-                slopes_m[side, axis] += samples.slope[m, k] * control_m[samples.first[m] + k, axis] / last
-    low, high = 0.0, 1.0
+            away_m += (points_m[behind, axis] - points_m[0, axis]) ** 2
+        away_m = np.sqrt(away_m)
+    slopes = np.zeros((2, 3))
+    for axis in range(3):
+        at_m[axis] = points_m[last, axis]
+        for k in range(4):
+            for side in range(2):
+                m = behind - 1 + side
+                slopes[side, axis] += samples.slope[m, k] * control_m[samples.first[m] + k, axis]
+    if away_m <= distance_m:
+        return -1
     for _ in range(HALVINGS):
         t = 0.5 * (low + high)
-        _between(points_m, behind - 1, slopes_m, t, at_m)
-        if _away(at_m, points_m[0]) > distance_m:
-            high = t
-        else:
-            low = t
-    return behind - 1, t
+        weights[0], weights[1] = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
+        weights[2], weights[3] = t * (1.0 - t) ** 2 / last, t * t * (t - 1.0) / last
+        away_m = 0.0
+        for axis in range(3):
+            at_m[axis] = weights[0] * points_m[behind - 1, axis] + weights[1] * points_m[behind, axis]
+            at_m[axis] += weights[2] * slopes[0, axis] + weights[3] * slopes[1, axis]
+            away_m += (at_m[axis] - points_m[0, axis]) ** 2
+        low, high = (low, t) if np.sqrt(away_m) > distance_m else (t, high)
+    for axis in range(3):
+        along[axis] = 6.0 * low * (1.0 - low) * (points_m[behind, axis] - points_m[behind - 1, axis])
+        along[axis] += (1.0 - low) * (1.0 - 3.0 * low) * slopes[0, axis] / last
+        along[axis] += low * (3.0 * low - 2.0) * slopes[1, axis] / last
+    return behind - 1
 
 
 @compiled
@@ -102,52 +114,19 @@ def in_contact(
 
 @compiled
 def from_join(
-    points_m: Array, at_m: Array, before: int, t: float, slopes_m: Array, by_at: Array, adjoint: Adjoint
+    points_m: Array, at_m: Array, before: int, weights: Array, along: Array, by_at: Array, adjoint: Adjoint
 ) -> None:
     """Add what a (3,) derivative by the place where a curve is joined means for the curve's samples.
 
     The place keeps its distance from the beginning: what would move it away is taken back along the curve.
     """
-    moved, last = np.empty(3), len(points_m) - 1
-    _along(points_m, before, slopes_m, t, moved)
     outwards, pulled = 0.0, 0.0
     for axis in range(3):
-        outwards += moved[axis] * (at_m[axis] - points_m[0, axis])
-        pulled += moved[axis] * by_at[axis]
-    weights = _weights(t)
+        outwards += along[axis] * (at_m[axis] - points_m[0, axis])
+        pulled += along[axis] * by_at[axis]
     for axis in range(3):
         by_place = by_at[axis] - (at_m[axis] - points_m[0, axis]) * pulled / max(outwards, 1e-9)
         adjoint.point[before, axis] += weights[0] * by_place
         adjoint.point[before + 1, axis] += weights[1] * by_place
-        adjoint.slope[before, axis] += weights[2] * by_place / last
-        adjoint.slope[before + 1, axis] += weights[3] * by_place / last
-
-
-@compiled
-def _weights(t: float) -> tuple[float, float, float, float]:
-    """What two places and their slopes weigh in the cubic between them."""
-    return (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t), t * (1.0 - t) ** 2, t * t * (t - 1.0)
-
-
-@compiled
-def _between(points_m: Array, before: int, slopes_m: Array, t: float, out_m: Array) -> None:
-    """Fill (3,) with the place at share t of the step from a sample to the next."""
-    weights = _weights(t)
-    for axis in range(3):
-        out_m[axis] = weights[0] * points_m[before, axis] + weights[1] * points_m[before + 1, axis]
-        out_m[axis] += weights[2] * slopes_m[0, axis] + weights[3] * slopes_m[1, axis]
-
-
-@compiled
-def _along(points_m: Array, before: int, slopes_m: Array, t: float, out: Array) -> None:
-    """Fill (3,) with the derivative of `_between` by t."""
-    for axis in range(3):
-        step_m = points_m[before + 1, axis] - points_m[before, axis]
-        out[axis] = 6.0 * t * (1.0 - t) * step_m
-        out[axis] += (1.0 - t) * (1.0 - 3.0 * t) * slopes_m[0, axis] + t * (3.0 * t - 2.0) * slopes_m[1, axis]
-
-
-@compiled
-def _away(a_m: Array, b_m: Array) -> float:
-    east, north, up = a_m[0] - b_m[0], a_m[1] - b_m[1], a_m[2] - b_m[2]
-    return np.sqrt(east * east + north * north + up * up)
+        adjoint.slope[before, axis] += weights[2] * by_place
+        adjoint.slope[before + 1, axis] += weights[3] * by_place
