@@ -11,7 +11,7 @@ from gcs.planner.coupling import Coupling
 from gcs.planner.curve_cost import Terms, sampling
 from gcs.planner.fleet_cost import Problem
 from gcs.planner.joining import Joining
-from gcs.planner.representation import LEG_SEGMENTS, Guide, guide_along, pin_weights, straight_legs
+from gcs.planner.representation import Guide, guide_along, pin_weights, straight_legs
 from missions import obstacles, time_law
 from missions.mission import Mission, Target
 
@@ -26,7 +26,10 @@ MEAN_UNIT_SHARE = 0.1
 
 MOST_SAMPLES = 512
 MOST_CONTROL_POINTS = 24
-"""Of curves that follow a guide path; targets on the way come on top of what the mission says."""
+"""Of curves that follow a guide path, for each leg of a route."""
+
+POINTS_PER_STOP = 6
+"""Control points that a target on the way adds; with four, climbs from target to target often have no room to wind."""
 
 FRACTIONS = 48
 """Fractions of the paths at which vehicles are compared."""
@@ -114,9 +117,9 @@ def guides(mission: Mission, routes: Sequence[Route]) -> list[Guide]:
 def control_points(mission: Mission, ways: Sequence[Way], per_corner: int = 0) -> int:
     """Control points of curves along such ways: as the mission says, more for many targets or to follow corners."""
     most_stops = max(len(way.stops) for way in ways)
-    enough = mission.planner.control_points + (LEG_SEGMENTS + 1) * most_stops
+    enough = mission.planner.control_points + POINTS_PER_STOP * most_stops
     corners = max(len(way.corners_m) for way in ways)
-    return max(enough, min(per_corner * corners, MOST_CONTROL_POINTS))
+    return max(enough, min(per_corner * corners, MOST_CONTROL_POINTS * (1 + most_stops)))
 
 
 def pose(mission: Mission, routes: Sequence[Route], guides: Sequence[Guide], care: Care = Care()) -> Problem:
