@@ -113,9 +113,9 @@ class App:
 
     async def _tick(self) -> None:
         loop = asyncio.get_running_loop()
-        due_s, interval_s = loop.time(), self.settings.pilot.tick_s / self.settings.speed
+        due_s = loop.time()
         while True:
-            due_s = max(due_s + interval_s, loop.time() - BEHIND_S)
+            due_s = max(due_s + self.settings.pilot.tick_s / self._clock.pace, loop.time() - BEHIND_S)
             await asyncio.sleep(due_s - loop.time())
             late_s, age_s = loop.time() - due_s, self._clock.age_s(loop.time())
             self._handle(events.Tick(odometry_age_s=age_s, lateness_ms=late_s * 1e3))
@@ -219,7 +219,8 @@ class App:
     async def _leave_after_error(self, problems: ExceptionGroup[Exception]) -> None:
         """Our own error: do what can still be done for the vehicle, and say what happened."""
         was_in_control = self.pilot.in_control
-        self.pilot.fail()
+        for instruction in self.pilot.fail(self._now_s):
+            self._carry_out(instruction)
         first: BaseException = problems
         while isinstance(first, BaseExceptionGroup):
             first = first.exceptions[0]

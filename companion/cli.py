@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-import msgspec
 import numpy as np
 import typer
 
@@ -25,7 +24,7 @@ from companion.settings import CompanionSettings, PlanningMode
 from companion.warm_up import warm_up
 from missions.errors import MissionError
 from missions.faults import EXAMPLES, Fault, parse_fault
-from missions.frames import GeodeticPoint
+from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
 from missions.ports import companion_port
@@ -88,21 +87,7 @@ def main() -> None:
 def _mission(path_or_name: str, origin: str | None, vehicle: int) -> Mission:
     mission = load_mission(path_or_name)
     mission.vehicle(vehicle)
-    return mission if origin is None else mission.moved_to(_place(origin))
-
-
-def _place(text: str) -> GeodeticPoint:
-    """LAT,LON,ALT.
-
-    Raises:
-        UsageError: it is not that.
-    """
-    try:
-        latitude, longitude, altitude = (float(part) for part in text.split(","))
-        values = {"latitude_deg": latitude, "longitude_deg": longitude, "altitude_amsl_m": altitude}
-        return msgspec.convert(values, GeodeticPoint)
-    except (ValueError, msgspec.ValidationError) as wrong:
-        raise UsageError(f"--origin {text}: expected LAT,LON,ALT such as 47.397,8.545,489 ({wrong})") from None
+    return mission if origin is None else mission.moved_to(parse_origin(origin))
 
 
 async def _fly(

@@ -22,12 +22,11 @@ from companion.settings import CompanionSettings
 from companion.states import NOT_READY, TRANSITIONS, UNDER_WAY, State
 from companion.status import StatusDesk
 from companion.utc_clock import UtcClock
+from companion.vehicle_clock import REBOOT_S
 from missions.mission import Mission, OnArrival
 from missions.tunnel import Reason
 
 ARRIVAL_MODES = {OnArrival.LAND: FlightMode.LAND, OnArrival.HOLD: FlightMode.HOLD, OnArrival.RTL: FlightMode.RTL}
-REBOOT_S = 1.0
-"""Vehicle time that goes back by so much is that of an autopilot that was started anew."""
 
 
 class Pilot:
@@ -55,8 +54,7 @@ class Pilot:
         self._utc = UtcClock()
         self._engagement: Engagement | None = None
         self._flight: Flight | None = None
-        self._leaving: FlightMode | None = None
-        """The mode that has been commanded to end the flight."""
+        self._leaving: FlightMode | None = None  # the mode that has been commanded to end the flight
         self._commanded_at_s = self._released_at_s = self._download_at_s = -np.inf
         self._stopping = self._downloading = False
         self._flown_plan_id = self._track_index = 0
@@ -90,14 +88,18 @@ class Pilot:
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
         """Take in one event at vehicle time `now_s`; what is to be done about it, in order."""
-        done = list(self._handlers[type(event)](event, now_s))
-        plan_id = self._flight.order.plan_id if self._flight is not None else self._briefing.plan_id
-        status = self._desk.write(self.state, self.reason, plan_id, self._track_index, self.figures, now_s)
-        return done if status is None else [*done, instructions.SendStatus(status)]
+        return [*self._handlers[type(event)](event, now_s), *self._report(now_s)]
 
-    def fail(self) -> None:
+    def fail(self, now_s: float) -> list[Instruction]:
         """The program has failed: nothing more comes from this pilot but its last state."""
         self._enter(State.FAILED, Reason.INTERNAL_ERROR)
+        return self._report(now_s)
+
+    def _report(self, now_s: float) -> list[Instruction]:
+        """The status, if it is due."""
+        plan_id = self._flight.order.plan_id if self._flight is not None else self._briefing.plan_id
+        status = self._desk.write(self.state, self.reason, plan_id, self._track_index, self.figures, now_s)
+        return [] if status is None else [instructions.SendStatus(status)]
 
     # ------------------------------------------------------------- the autopilot
 
@@ -231,9 +233,8 @@ class Pilot:
         over = self.state in resting and self._flight is None
         fresh = self._briefing.plan_id != self._flown_plan_id
         grounded = self.state is State.RELEASED and self._on_ground and not self._armed
-        if not (self.state in {State.CONNECTING, State.WAITING, State.READY} or (over and (fresh or grounded))):
-            return
-        if not self._connected:
+        settling = self.state in {State.CONNECTING, State.WAITING, State.READY} or (over and (fresh or grounded))
+        if not (self._connected and settling):
             return
         if self._missing is not Reason.NONE:
             self._enter(State.WAITING, self._missing)
@@ -377,8 +378,7 @@ class Pilot:
     def _fly(self, flight: Flight, event: events.Tick, now_s: float) -> Iterator[Instruction]:
         yield from self._utc.stamped(flight.tick(now_s, event.odometry_age_s))
         self._track_index = flight.track_index
-        state = State.FLYING if flight.holding is Reason.NONE else State.HOLDING
-        self._enter(state, flight.holding)
+        self._enter(State.FLYING if flight.holding is Reason.NONE else State.HOLDING, flight.holding)
         if self._leaving is not None:
             yield from self._repeat_command(self._leaving, now_s)
         elif self._stopping and flight.is_at_rest(now_s):

@@ -17,9 +17,9 @@ class PlanningMode(Enum):
 class Reserve:
     """How much of the mission's limits a plan uses: the rest is for tracking errors and noise."""
 
-    nominal_share: float = 0.92
+    nominal_share: float = 0.9
     """Speed that is aimed at, as a share of the limit."""
-    limit_share: float = 0.95
+    limit_share: float = 0.93
     """No plan is faster than this share of the limit."""
     distance_share: float = 0.15
     """Required clearance and avoidance distance are planned larger by this share ..."""

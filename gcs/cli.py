@@ -10,7 +10,6 @@ from collections.abc import Coroutine, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import msgspec
 import typer
 
 from gcs import settings as chosen
@@ -19,7 +18,7 @@ from gcs.link.url import parse_link_url
 from missions.errors import MissionError
 from missions.faults import EXAMPLES as FAULT_EXAMPLES
 from missions.faults import SIMULATOR_EXAMPLES, Fault, SimulatorFault, parse_any_fault
-from missions.frames import GeodeticPoint
+from missions.frames import GeodeticPoint, parse_origin
 from missions.mission import Mission, load_mission, shipped_missions
 
 if TYPE_CHECKING:
@@ -317,12 +316,7 @@ def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
         return None
     if text == "here":
         return chosen.OriginHere.HERE
-    try:
-        latitude, longitude, altitude = (float(part) for part in text.split(","))
-        fields = {"latitude_deg": latitude, "longitude_deg": longitude, "altitude_amsl_m": altitude}
-        return msgspec.convert(fields, GeodeticPoint)
-    except (ValueError, msgspec.ValidationError) as problem:
-        raise UsageError(f"--origin {text}: expected LAT,LON,ALT or `here`: {problem}") from None
+    return parse_origin(text)
 
 
 def _check_output(path: Path) -> None:

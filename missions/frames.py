@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pymap3d
 
+from missions.errors import MissionError
+
 Array = npt.NDArray[np.float64]
 
 PX4_EARTH = pymap3d.Ellipsoid(6_371_000.0, 6_371_000.0)
@@ -29,6 +31,24 @@ class GeodeticPoint(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     latitude_deg: Latitude
     longitude_deg: Longitude
     altitude_amsl_m: Altitude = 0.0
+
+
+def parse_origin(text: str) -> GeodeticPoint:
+    """Read a place as it is written on the command line: LAT,LON,ALT in degrees and metres above mean sea level.
+
+    Raises:
+        MissionError: naming what was expected and what was found.
+
+    Example:
+        >>> parse_origin("47.4,8.5,490").altitude_amsl_m
+        490.0
+    """
+    try:
+        latitude_deg, longitude_deg, altitude_amsl_m = (float(part) for part in text.split(","))
+        place = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg, "altitude_amsl_m": altitude_amsl_m}
+        return msgspec.convert(place, GeodeticPoint)
+    except (ValueError, msgspec.ValidationError) as wrong:
+        raise MissionError(f"--origin {text}: expected LAT,LON,ALT such as 47.3977,8.5456,489.4 ({wrong})") from None
 
 
 @dataclass(frozen=True)

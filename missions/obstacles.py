@@ -18,7 +18,9 @@ FAR_M = 1e6
 """The clearance of a world with nothing in it [m]."""
 
 PROFILE_SAMPLES = 12
-"""Points of a peak's profile that are looked at before the nearest one is sharpened."""
+"""Points of a peak's profile that are looked at before the nearest one is sharpened ..."""
+NEAR_ENOUGH = 1e-5
+"""... until it moves by no more than this share of the slope; the distance is off by the square of that."""
 
 
 class Obstacles(NamedTuple):
@@ -132,7 +134,8 @@ def _to_peak(east: float, north: float, up: float, peak: Array, nearer_than: flo
     de, dn = east - peak[0], north - peak[1]
     radius = np.sqrt(de * de + dn * dn)
     slope, height, foot = peak[2], peak[3], peak[4]
-    if max(radius - foot, up - height) >= nearer_than:
+    beyond, above = max(radius - foot, 0.0), max(up - height, 0.0)
+    if nearer_than > 0.0 and beyond * beyond + above * above >= nearer_than * nearer_than:
         return nearer_than  # its bounding cylinder is farther off already
     steepness = -1.0 / (slope * slope)
     level = min(max(up, BASE_HEIGHT_SHARE * height), height)
@@ -160,9 +163,9 @@ def _to_peak(east: float, north: float, up: float, peak: Array, nearer_than: flo
         curvature = 1.0 + dz * dz + (z - up) * ddz
         stepped = u - half_slope / curvature if curvature > 0.0 else low - 1.0
         stepped = stepped if low <= stepped <= high else 0.5 * (low + high)
-        if abs(stepped - u) < 1e-9 * slope:
+        moved, u = abs(stepped - u), stepped
+        if moved < NEAR_ENOUGH * slope:
             break
-        u = stepped
     best = min(best, (u - radius) ** 2 + (height * np.exp(steepness * u * u) - up) ** 2)
     inside = radius < foot and up < height * np.exp(steepness * radius * radius)
     return -np.sqrt(best) if inside else np.sqrt(best)

@@ -14,14 +14,14 @@ import typer
 
 from missions.errors import MissionError
 from missions.faults import SIMULATOR_EXAMPLES, parse_simulator_fault
-from missions.frames import GeodeticPoint
+from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
 from missions.ports import FIRST_COMPANION_PORT
 from sitl.autopilot.memory import Memory, SigningMemory
 from sitl.autopilot.parameter_table import parameter_table
 from sitl.dynamics.airframe import AirframeName
-from sitl.errors import BadPlace, SitlError
+from sitl.errors import SitlError
 from sitl.lean_numba import leave_scipy_out
 from sitl.link.memory_files import MemoryFiles
 from sitl.open_field import open_field
@@ -167,21 +167,10 @@ def _mission(name: str | None, n_vehicles: int | None, origin: str | None) -> Mi
     """The mission to simulate, moved if need be.
 
     Raises:
-        MissionError: the file cannot be used.
-        BadPlace: the origin is no place.
+        MissionError: the file cannot be used, or the origin is no place.
     """
     mission = load_mission(name) if name is not None else open_field(n_vehicles or 1)
-    return mission if origin is None else mission.moved_to(_place(origin))
-
-
-def _place(text: str) -> GeodeticPoint:
-    try:
-        latitude, longitude, altitude = (float(part) for part in text.split(","))
-    except ValueError:
-        raise BadPlace(text) from None
-    if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0 and -500.0 <= altitude <= 9000.0):
-        raise BadPlace(text)
-    return GeodeticPoint(latitude_deg=latitude, longitude_deg=longitude, altitude_amsl_m=altitude)
+    return mission if origin is None else mission.moved_to(parse_origin(origin))
 
 
 def _ports(text: str) -> tuple[int, int]:

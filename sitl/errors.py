@@ -60,17 +60,6 @@ class BadParameterFile(SitlError):
         super().__init__(f"--parameters {path}:{line}: expected {expected}, found {found!r}")
 
 
-class BadPlace(SitlError):
-    """An `--origin` that is no place.
-
-    Args:
-        text: what was given.
-    """
-
-    def __init__(self, text: str) -> None:
-        super().__init__(f"--origin {text}: expected LAT,LON,ALT in degrees and metres, such as 47.3977,8.5456,489.4")
-
-
 class BadSigningFile(SitlError):
     """A stored key or its timestamps cannot be read; what is in the file is not shown."""
 

@@ -13,7 +13,6 @@ from gcs.planner.plan import TimedCurve, VehiclePlan, Violation
 from gcs.planner.problem import Route
 from gcs.planner.timing import Timing, common_timing
 from gcs.planner.track_points import sample_track
-from missions import obstacles
 from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
@@ -32,15 +31,14 @@ class Candidate:
 def judged(mission: Mission, routes: Sequence[Route], controls_m: Array) -> Candidate:
     """Dense curves, times and verdict for (vehicles, n, 3) control points, ENU [m]."""
     curves_m = dense_curves(controls_m, feasibility.SPACING_M[mission.site])
-    solid = obstacles.pack(mission.world.as_known())
-    clearance_m = np.array([obstacles.clearance(curve_m, solid) for curve_m in curves_m])
-    timing = common_timing(mission, curves_m, clearance_m)
+    measured = feasibility.measure(mission, curves_m)
+    timing = common_timing(mission, curves_m, measured.clearance_m, measured.curvature_1_m)
     curves = tuple(
         TimedCurve(route.name, route.sysid, route.targets, curve_m, timing.times_s)
         for route, curve_m in zip(routes, curves_m, strict=True)
     )
-    found = feasibility.violations(mission, curves)
-    return Candidate(curves, timing, objective(mission, curves_m, clearance_m), found)
+    found = feasibility.violations(mission, curves, measured)
+    return Candidate(curves, timing, objective(mission, curves_m, measured.clearance_m, measured.height_m), found)
 
 
 def vehicle_plans(mission: Mission, candidate: Candidate) -> tuple[VehiclePlan, ...]:

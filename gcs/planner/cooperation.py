@@ -1,5 +1,7 @@
 """One small swarm per vehicle, searching in turn: each against the present curves of all others."""
 
+import functools
+
 import numpy as np
 import numpy.typing as npt
 
@@ -35,20 +37,24 @@ class Cooperation:
         self.offsets = np.zeros((n_vehicles, 2 * (n_control - 2)))
         self.curve_evaluations = 0
         self._first = bows(n_control) if bent else np.zeros((1, self.offsets.shape[1]))
+        self._context: Context | None = None
+
+    @functools.cached_property
+    def _swarms(self) -> list[Ecpso]:
+        """One per vehicle; they come into being when they are first needed, which first plans often go without."""
+        n_vehicles, n_control = self.problem.base_m.shape[:2]
 
         def fresh(generator: np.random.Generator, count: int) -> Array:
-            if not bent:
+            if not self._bent:
                 return generator.uniform(-1.0, 1.0, (count, self.offsets.shape[1]))
             return fresh_bows(generator, count, n_control)
 
-        self._swarms = [Ecpso(self._first, fresh, settings, generator) for generator in rng.spawn(n_vehicles)]
-        self._context = no_others(n_vehicles, len(problem.coupling.first))
-        self._enter_all()
+        return [Ecpso(self._first, fresh, self._settings, generator) for generator in self._rng.spawn(n_vehicles)]
 
     def start(self) -> None:
         """Give every vehicle the best of the first particles, in turn, until the choices fit one another."""
         for _ in range(SWEEPS):
-            for vehicle in range(len(self._swarms)):
+            for vehicle in range(len(self.offsets)):
                 costs = self._costs(vehicle, self._first)
                 self._enter(vehicle, self._first[int(np.argmin(costs))])
 
@@ -62,8 +68,8 @@ class Cooperation:
         Returns:
             (vehicles,) sums of squared violations.
         """
-        found = [self._best_alone(vehicle, most, enough) for vehicle in range(len(self._swarms))]
-        self._enter_all()
+        found = [self._best_alone(vehicle, most, enough) for vehicle in range(len(self.offsets))]
+        self._context = None
         return np.array(found)
 
     def _best_alone(self, vehicle: int, most: int, enough: float) -> float:
@@ -91,6 +97,7 @@ class Cooperation:
         for vehicle, swarm in enumerate(self._swarms):
             present = float(self._costs(vehicle, self.offsets[vehicle : vehicle + 1])[0])
             swarm.remember(self._costs(vehicle, swarm.memory))
+            swarm.offer(self.offsets[vehicle], present)
             for _ in range(self._settings.window):
                 swarm.tell(self._costs(vehicle, swarm.ask()))
             position, cost = swarm.best()
@@ -114,25 +121,27 @@ class Cooperation:
     def pose(self, problem: Problem) -> None:
         """Go on with the same variables, but other limits."""
         self.problem = problem
-        self._enter_all()
+        self._context = None
 
     def adopt(self, offsets: Array) -> None:
-        """Take over a whole plan, (vehicles, d), and let the swarms know of it."""
+        """Take over a whole plan, (vehicles, d)."""
         self.offsets = offsets.copy()
-        self._enter_all()
-        for vehicle, swarm in enumerate(self._swarms):
-            swarm.offer(offsets[vehicle], float(self._costs(vehicle, offsets[vehicle : vehicle + 1])[0]))
+        self._context = None
 
-    def _enter_all(self) -> None:
-        for vehicle, offsets in enumerate(self.offsets):
-            set_context(self.problem, vehicle, offsets, self._context)
+    def _others(self) -> Context:
+        """Where all vehicles are on their present curves; worked out when it is asked for."""
+        if self._context is None:
+            self._context = no_others(len(self.offsets), len(self.problem.coupling.first))
+            for vehicle, offsets in enumerate(self.offsets):
+                set_context(self.problem, vehicle, offsets, self._context)
+        return self._context
 
     def _enter(self, vehicle: int, offsets: Array) -> None:
         self.offsets[vehicle] = offsets
-        set_context(self.problem, vehicle, offsets, self._context)
+        set_context(self.problem, vehicle, offsets, self._others())
 
     def _costs(self, vehicle: int, positions: Array, context: Context | None = None) -> Array:
         objective, violation = np.empty(len(positions)), np.empty(len(positions))
-        swarm_cost(self.problem, vehicle, positions, context or self._context, objective, violation)
+        swarm_cost(self.problem, vehicle, positions, context or self._others(), objective, violation)
         self.curve_evaluations += len(positions)
         return objective + self.problem.terms.penalty_weight * violation

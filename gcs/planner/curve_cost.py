@@ -6,6 +6,7 @@ polygon is differentiated by hand and collected in an `Adjoint`. The coupling be
 its part before `pull_back` carries everything to the control points.
 """
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -91,14 +92,17 @@ def new_adjoint(n_samples: int) -> Adjoint:
     return Adjoint(by_point, by_slope, by_bend, np.empty(max(n_samples - 1, 0)))
 
 
+@functools.lru_cache(maxsize=64)
 def sampling(n_control: int, n_samples: int) -> Sampling:
-    """Samples at equal steps of the parameter of a clamped cubic with `n_control` control points."""
+    """Samples at equal steps of the parameter of a clamped cubic with `n_control` control points; read-only."""
     u = np.linspace(0.0, 1.0, n_samples)
     segments = n_control - bspline.DEGREE
     first = np.minimum((u * segments).astype(np.int64), segments - 1)
     spline = BSpline(bspline.clamped_knots(n_control), np.eye(n_control), bspline.DEGREE)
     touched = first[:, None] + np.arange(bspline.DEGREE + 1)
     position, slope, bend = (np.take_along_axis(spline(u, order), touched, axis=1) for order in range(3))
+    for array in (first, position, slope, bend):
+        array.flags.writeable = False
     return Sampling(first, position, slope, bend)
 
 

@@ -59,8 +59,7 @@ def path_lengths(curves_m: Array) -> Array:
 
 def lengths(vectors: Array) -> Array:
     """(...,) Euclidean lengths of (..., 3) vectors; several times as fast as `numpy.linalg.norm` along an axis."""
-    east, north, up = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    return np.sqrt(east * east + north * north + up * up)
+    return _length(vectors[..., 0], vectors[..., 1], vectors[..., 2])
 
 
 def passing_samples(curve_m: Array, stops_m: Array) -> list[int]:
@@ -72,17 +71,24 @@ def passing_samples(curve_m: Array, stops_m: Array) -> list[int]:
     return passed
 
 
-def curvature(curve_m: Array) -> Array:
-    """(m,) curvature [1/m] of a densely sampled (m, 3) curve: of the circle through each sample and its neighbours."""
-    east, north, up = np.ascontiguousarray(np.diff(curve_m, axis=0).T)  # contiguous: four times as fast
-    step_m = np.sqrt(east * east + north * north + up * up)
-    across = east[:-1] + east[1:], north[:-1] + north[1:], up[:-1] + up[1:]
-    over_both_m = np.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
-    turned = (
-        north[:-1] * up[1:] - up[:-1] * north[1:],
-        up[:-1] * east[1:] - east[:-1] * up[1:],
-        east[:-1] * north[1:] - north[:-1] * east[1:],
+def curvature(curves_m: Array) -> Array:
+    """(..., m) curvature [1/m] of densely sampled (..., m, 3) curves.
+
+    It is that of the circle through each sample and its neighbours; the outer two have their neighbours'.
+    """
+    steps_m = np.diff(curves_m, axis=-2)
+    east, north, up = np.ascontiguousarray(np.moveaxis(steps_m, -1, 0))  # contiguous: several times as fast
+    step_m = _length(east, north, up)
+    before, after = (east[..., :-1], north[..., :-1], up[..., :-1]), (east[..., 1:], north[..., 1:], up[..., 1:])
+    over_both_m = _length(*(one + next_one for one, next_one in zip(before, after, strict=True)))
+    doubled_area = _length(
+        before[1] * after[2] - before[2] * after[1],
+        before[2] * after[0] - before[0] * after[2],
+        before[0] * after[1] - before[1] * after[0],
     )
-    doubled_area = np.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2)
-    inner = 2.0 * doubled_area / np.maximum(step_m[:-1] * step_m[1:] * over_both_m, 1e-12)
-    return np.concatenate((inner[:1], inner, inner[-1:]))
+    inner = 2.0 * doubled_area / np.maximum(step_m[..., :-1] * step_m[..., 1:] * over_both_m, 1e-12)
+    return np.concatenate((inner[..., :1], inner, inner[..., -1:]), axis=-1)
+
+
+def _length(east: Array, north: Array, up: Array) -> Array:
+    return np.sqrt(east * east + north * north + up * up)

@@ -39,6 +39,7 @@ class _Fleet:
     Args:
         places_m: (vehicles, m, 3) ENU.
         times_s: (m,) since T0.
+        steps_m: (vehicles, m - 1) from sample to sample.
         near_start: (vehicles, m) in the zone around the launch point: separation rests there, contact does not ...
         joined: (vehicles, m) ... once a vehicle has joined its curve from its pad.
         near_target: (vehicles, m) in the zone around a target: clearance and height rest in all zones.
@@ -46,25 +47,60 @@ class _Fleet:
 
     places_m: Array
     times_s: Array
+    steps_m: Array
     near_start: BoolArray
     joined: BoolArray
     near_target: BoolArray
 
 
-def violations(mission: Mission, vehicles: Sequence[TimedCurve]) -> tuple[Violation, ...]:
+@dataclass(frozen=True)
+class Measured:
+    """What the judge measures at every sample of every curve; times and objective follow from the same numbers.
+
+    Args:
+        clearance_m: (vehicles, m) in the world as it is known.
+        height_m: (vehicles, m) above the terrain.
+        curvature_1_m: (vehicles, m).
+    """
+
+    clearance_m: Array
+    height_m: Array
+    curvature_1_m: Array
+
+
+def measure(mission: Mission, curves_m: Array) -> Measured:
+    """Measure (vehicles, m, 3) curves, ENU [m]."""
+    solid = obstacles.pack(mission.world.as_known())
+    return Measured(
+        clearance_m=obstacles.clearance(curves_m, solid).reshape(curves_m.shape[:2]),
+        height_m=curves_m[..., 2] - obstacles.terrain_height(curves_m, solid),
+        curvature_1_m=curvature(curves_m),
+    )
+
+
+def violations(
+    mission: Mission, vehicles: Sequence[TimedCurve], measured: Measured | None = None
+) -> tuple[Violation, ...]:
     """Everything that is wrong with a plan: the worst breach of each limit by each vehicle or pair of vehicles.
+
+    Args:
+        mission: its limits and its world as it is known.
+        vehicles: the plan.
+        measured: what `measure` finds on these curves, where that is known already.
 
     Raises:
         ValueError: samples are too far apart to be judged, or not those of common times.
     """
     fleet = _assemble(mission, vehicles)
+    measured = measured or measure(mission, fleet.places_m)
     found: list[Violation] = []
     for index, vehicle in enumerate(vehicles):
         found += _ends(mission, vehicle)
         found += _passed(mission, vehicle)
-        found += _near_things(mission, vehicle, fleet.near_start[index] | fleet.near_target[index])
+        in_zone = fleet.near_start[index] | fleet.near_target[index]
+        found += _near_things(mission, vehicle, in_zone, measured.clearance_m[index], measured.height_m[index])
         found += _outside(mission, vehicle)
-        found += _shape(mission, vehicle)
+        found += _shape(mission, vehicle, measured.curvature_1_m[index])
         found += _reach(mission, vehicle)
     if len(vehicles) > 1:
         found += _joining(mission, vehicles, fleet)
@@ -78,16 +114,18 @@ def _assemble(mission: Mission, vehicles: Sequence[TimedCurve]) -> _Fleet:
     for vehicle in vehicles:
         if not np.array_equal(vehicle.times_s, times_s):
             raise ValueError(f"the samples of {vehicle.name}'s curve are not at the times of {vehicles[0].name}'s")
-        apart_m = float(lengths(np.diff(vehicle.curve_m, axis=0)).max())
+    places_m = np.array([vehicle.curve_m for vehicle in vehicles])
+    steps_m = lengths(np.diff(places_m, axis=1))
+    for vehicle, apart_m in zip(vehicles, steps_m.max(axis=1).tolist(), strict=True):
         if apart_m > spacing_m:
             raise ValueError(
                 f"samples of {vehicle.name}'s curve: {apart_m:.3g} m apart, expected at most {spacing_m:g} m"
             )
-    places_m = np.array([vehicle.curve_m for vehicle in vehicles])
     flown_m = lengths(places_m - places_m[:, :1])
     to_target_m = np.array([_to_targets(vehicle) for vehicle in vehicles])
     radius_m = mission.launch_zone_radius_m
-    return _Fleet(places_m, times_s, flown_m < radius_m, flown_m > join_distance_m(mission), to_target_m < radius_m)
+    joined = flown_m > join_distance_m(mission)
+    return _Fleet(places_m, times_s, steps_m, flown_m < radius_m, joined, to_target_m < radius_m)
 
 
 def _to_targets(vehicle: TimedCurve) -> Array:
@@ -117,13 +155,13 @@ def _passed(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
             yield Violation(vehicle.name, Limit.ROUTE, where, off_m, near_m)
 
 
-def _near_things(mission: Mission, vehicle: TimedCurve, in_zone: BoolArray) -> Iterator[Violation]:
-    limits, solid = mission.limits, obstacles.pack(mission.world.as_known())
-    clearance_m = obstacles.clearance(vehicle.curve_m, solid)
+def _near_things(
+    mission: Mission, vehicle: TimedCurve, in_zone: BoolArray, clearance_m: Array, height_m: Array
+) -> Iterator[Violation]:
+    limits = mission.limits
     yield from _least(
         vehicle, Limit.CLEARANCE, clearance_m, np.where(in_zone, limits.body_radius_m, limits.clearance_m)
     )
-    height_m = vehicle.curve_m[:, 2] - obstacles.terrain_height(vehicle.curve_m, solid)
     yield from _least(vehicle, Limit.HEIGHT, height_m, np.where(in_zone, 0.0, limits.height_m))
 
 
@@ -134,13 +172,18 @@ def _outside(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
     yield from _most(vehicle, Limit.BOUNDS, out_m, 0.0)
 
 
-def _shape(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
-    limits, steps_m = mission.limits, np.diff(vehicle.curve_m, axis=0)
-    radius_m = 1.0 / np.maximum(curvature(vehicle.curve_m), 1e-12)
+def _shape(mission: Mission, vehicle: TimedCurve, curvature_1_m: Array) -> Iterator[Violation]:
+    limits = mission.limits
+    radius_m = 1.0 / np.maximum(curvature_1_m, 1e-12)
     yield from _least(vehicle, Limit.TURN_RADIUS, radius_m, np.full(len(radius_m), limits.turn_radius_m))
-    climb_deg = np.degrees(np.arctan2(np.abs(steps_m[:, 2]), np.hypot(steps_m[:, 0], steps_m[:, 1])))
-    moving = lengths(steps_m) > ROUNDING
-    yield from _most(vehicle, Limit.CLIMB_ANGLE, np.where(moving, climb_deg, 0.0), limits.climb_angle_deg)
+    east_m, north_m, up_m = np.ascontiguousarray(np.diff(vehicle.curve_m, axis=0).T)
+    level_m = np.sqrt(east_m * east_m + north_m * north_m)
+    moving = np.maximum(level_m, np.abs(up_m)) > ROUNDING
+    steepness = np.where(moving, np.abs(up_m) / np.maximum(level_m, ROUNDING), 0.0)
+    climb_deg = np.zeros(len(up_m))
+    worst = int(np.argmax(steepness))
+    climb_deg[worst] = np.degrees(np.arctan(steepness[worst]))
+    yield from _most(vehicle, Limit.CLIMB_ANGLE, climb_deg, limits.climb_angle_deg)
 
 
 def _reach(mission: Mission, vehicle: TimedCurve) -> Iterator[Violation]:
@@ -158,7 +201,10 @@ def _joining(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) ->
     """
     if mission.launch_point_m is None:
         return
-    places_m = np.array([_way_to_curve(mission, *each) for each in zip(vehicles, fleet.joined, strict=True)])
+    distance_m = join_distance_m(mission)
+    places_m = np.array(
+        [_way_to_curve(mission, *each, distance_m) for each in zip(vehicles, fleet.joined, strict=True)]
+    )
     contact_m = 2.0 * mission.limits.body_radius_m
     for i, vehicle in enumerate(vehicles):
         nearest_m = lengths(places_m[i + 1 :] - places_m[i]).min(axis=1)
@@ -167,11 +213,16 @@ def _joining(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet) ->
             yield Violation(vehicle.name, Limit.SEPARATION, where, float(nearest_m[j]), contact_m)
 
 
-def _way_to_curve(mission: Mission, vehicle: TimedCurve, joined: BoolArray) -> Array:
-    """(`JOINING_SAMPLES`, 3) places from the hover above the pad to the first sample at which the curve is joined."""
+def _way_to_curve(mission: Mission, vehicle: TimedCurve, joined: BoolArray, distance_m: float) -> Array:
+    """(`JOINING_SAMPLES`, 3) places from the hover above the pad to where the curve is joined."""
     pad_m = np.array(mission.vehicle(vehicle.sysid).pad_m)
     hover_m = pad_m + np.array([0.0, 0.0, mission.takeoff_height_m])
-    at_m = vehicle.curve_m[int(np.argmax(joined))] if joined.any() else vehicle.curve_m[-1]
+    at_m = vehicle.curve_m[-1]
+    if joined.any():
+        before_m, behind_m = vehicle.curve_m[(first := int(np.argmax(joined))) - 1 : first + 1]
+        away_m = lengths(np.stack((before_m, behind_m)) - vehicle.curve_m[0])
+        share = (distance_m - away_m[0]) / (away_m[1] - away_m[0])
+        at_m = before_m + share * (behind_m - before_m)
     return hover_m + np.linspace(0.0, 1.0, JOINING_SAMPLES)[:, None] * (at_m - hover_m)
 
 
@@ -221,19 +272,21 @@ def _samples_ahead(mission: Mission, fleet: _Fleet) -> int:
 def _may_meet(mission: Mission, fleet: _Fleet, ahead: int) -> list[IntArray]:
     """For every vehicle the others that come near enough, by few samples, to be looked at in all.
 
+    Where only equal times matter, each pair is looked at once.
     Between a sample and the nearest one that is looked at here lie at most half a stride; a vehicle cannot move farther
     than the samples between are apart.
     """
     places_m = fleet.places_m[:, ::COARSE_STRIDE]
-    step_m = float(lengths(np.diff(fleet.places_m, axis=1)).max())
+    step_m = float(fleet.steps_m.max())
     reach_m = (
         max(mission.limits.separation_m, 2.0 * mission.limits.body_radius_m) + (2 * COARSE_STRIDE + ahead) * step_m
     )
     found = []
     for i, own_m in enumerate(places_m):
-        near = lengths(places_m - own_m).min(axis=1) <= reach_m
-        near[i] = False
-        found.append(np.flatnonzero(near))
+        begin = i + 1 if ahead == 1 else 0
+        near = lengths(places_m[begin:] - own_m).min(axis=1) <= reach_m
+        others = begin + np.flatnonzero(near)
+        found.append(others[others != i])
     return found
 
 

@@ -15,6 +15,7 @@ from gcs.planner.coupling import (
     too_close,
 )
 from gcs.planner.curve_cost import Adjoint, Sampling, Terms, curve_cost, new_adjoint, place_samples, pull_back
+from gcs.planner.joining import Joining, from_join, in_contact, join
 from missions.kernels import compiled
 from missions.obstacles import Obstacles
 
@@ -38,6 +39,7 @@ class Problem(NamedTuple):
     samples: Sampling
     terms: Terms
     coupling: Coupling
+    joining: Joining
     obstacles: Obstacles
 
 
@@ -50,11 +52,18 @@ class Context(NamedTuple):
     """(vehicles,) how far each flies from one place to the next."""
     means_m: Array
     """(vehicles, vehicles) mean distances, zero on the diagonal."""
+    joins_m: Array
+    """(vehicles, 3) where they have joined their curves from their pads."""
 
 
 def no_others(n_vehicles: int = 1, n_fractions: int = 1) -> Context:
     """A context that nobody has been entered into; with one vehicle nobody ever is."""
-    return Context(np.zeros((n_vehicles, n_fractions, 3)), np.zeros(n_vehicles), np.zeros((n_vehicles, n_vehicles)))
+    return Context(
+        np.zeros((n_vehicles, n_fractions, 3)),
+        np.zeros(n_vehicles),
+        np.zeros((n_vehicles, n_vehicles)),
+        np.zeros((n_vehicles, 3)),
+    )
 
 
 def all_control_points(problem: Problem, offsets: Array) -> Array:
@@ -100,6 +109,7 @@ def swarm_cost(
     control, zones_m = np.empty_like(problem.base_m[vehicle]), problem.zones_m[vehicle]
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
     places, side, share = np.empty((n_fractions, 3)), np.empty(n_fractions, np.int64), np.empty(n_fractions)
+    at_m, join_weights, join_slopes, joining = np.empty(3), np.empty(4), np.empty(3), problem.joining
     unwanted = new_adjoint(0)
     for i in range(len(offsets)):
         control_points(problem, vehicle, offsets[i], control)
@@ -109,6 +119,13 @@ def swarm_cost(
         if len(context.places_m) > 1:
             step = at_fractions(points, chords, places, side, share)
             violation[i] += _towards_others(problem.coupling, vehicle, places, step, context)
+            if len(joining.hovers_m) > 0:
+                join(control, problem.samples, points, joining.distance_m, at_m, join_weights, join_slopes)
+                for other in range(len(context.joins_m)):
+                    if other != vehicle:
+                        violation[i] += in_contact(
+                            joining, vehicle, at_m, other, context.joins_m[other], 0.0, at_m, at_m
+                        )
 
 
 def set_context(problem: Problem, vehicle: int, offsets: Array, context: Context) -> None:
@@ -120,6 +137,8 @@ def set_context(problem: Problem, vehicle: int, offsets: Array, context: Context
     place_samples(control, problem.samples, points, chords)
     places, side, share = context.places_m[vehicle], np.empty(n_fractions, np.int64), np.empty(n_fractions)
     context.steps_m[vehicle] = at_fractions(points, chords, places, side, share)
+    joined_m, join_weights, join_slopes = context.joins_m[vehicle], np.empty(4), np.empty(3)
+    join(control, problem.samples, points, problem.joining.distance_m, joined_m, join_weights, join_slopes)
     for other in range(len(context.places_m)):
         if other != vehicle:
             mean = mean_distance(places, context.places_m[other])
@@ -143,6 +162,13 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
     places, by_place = np.empty((n_vehicles, n_fractions, 3)), np.zeros((n_vehicles, n_fractions, 3))
     side, share = np.empty((n_vehicles, n_fractions), np.int64), np.empty((n_vehicles, n_fractions))
     steps = np.empty(n_vehicles)
+    joins, by_join = np.empty((n_vehicles, 3)), np.zeros((n_vehicles, 3))
+    before, join_weights, join_slopes = (
+        np.empty(n_vehicles, np.int64),
+        np.empty((n_vehicles, 4)),
+        np.empty((n_vehicles, 3)),
+    )
+    joined_from_pads = len(problem.joining.hovers_m) > 0 and n_vehicles > 1
     objective = violation = 0.0
     for i in range(n_vehicles):
         control_points(problem, i, offsets[i], control)
@@ -159,11 +185,25 @@ def fleet_cost(problem: Problem, offsets: Array, gradient: Array) -> tuple[float
         )
         objective, violation = objective + cost, violation + broken
         steps[i] = at_fractions(points[i], chords[i], places[i], side[i], share[i])
+        if joined_from_pads:
+            before[i] = join(
+                control,
+                problem.samples,
+                points[i],
+                problem.joining.distance_m,
+                joins[i],
+                join_weights[i],
+                join_slopes[i],
+            )
     if n_vehicles > 1:
         violation += _between_all(problem.coupling, problem.terms.penalty_weight, places, steps, by_place)
+    if joined_from_pads:
+        violation += _joining_all(problem.joining, problem.terms.penalty_weight, joins, by_join)
     for i in range(n_vehicles):
         from_fractions(points[i], chords[i], side[i], share[i], by_place[i], by_point[i], by_chord[i])
         adjoint = Adjoint(by_point[i], by_slope[i], by_bend[i], by_chord[i])
+        if joined_from_pads and before[i] >= 0:
+            from_join(points[i], joins[i], before[i], join_weights[i], join_slopes[i], by_join[i], adjoint)
         pull_back(problem.samples, points[i], chords[i], adjoint, control)
         _to_offsets(control, problem.axes_m[i], problem.pins[i], problem.pin_weights, gradient[i])
     return objective, violation
@@ -184,6 +224,9 @@ def plan_costs(problem: Problem, controls_m: Array, objective: Array, violation:
     points, chords = np.empty((n_samples, 3)), np.empty(n_samples - 1)
     places, unused = np.empty((n_vehicles, n_fractions, 3)), np.zeros((n_vehicles, n_fractions, 3))
     side, share, steps = np.empty(n_fractions, np.int64), np.empty(n_fractions), np.empty(n_vehicles)
+    joins, by_join = np.empty((n_vehicles, 3)), np.zeros((n_vehicles, 3))
+    join_weights, join_slopes = np.empty(4), np.empty(3)
+    joined_from_pads = len(problem.joining.hovers_m) > 0 and n_vehicles > 1
     unwanted = new_adjoint(0)
     for plan in range(n_plans):
         objective[plan] = violation[plan] = 0.0
@@ -200,8 +243,20 @@ def plan_costs(problem: Problem, controls_m: Array, objective: Array, violation:
             )
             objective[plan], violation[plan] = objective[plan] + cost, violation[plan] + broken
             steps[i] = at_fractions(points, chords, places[i], side, share)
+            if joined_from_pads:
+                join(
+                    controls_m[plan, i],
+                    problem.samples,
+                    points,
+                    problem.joining.distance_m,
+                    joins[i],
+                    join_weights,
+                    join_slopes,
+                )
         if n_vehicles > 1:
             violation[plan] += _between_all(problem.coupling, 0.0, places, steps, unused)
+        if joined_from_pads:
+            violation[plan] += _joining_all(problem.joining, 0.0, joins, by_join)
 
 
 @compiled
@@ -248,6 +303,16 @@ def _between_all(coupling: Coupling, weight: float, places_m: Array, steps_m: Ar
         for b in range(a):
             if mean[a] + mean[b] != 0.0:
                 add_mean_gradient(places_m[a], places_m[b], mean[a] + mean[b], by_place[a], by_place[b])
+    return violation
+
+
+@compiled
+def _joining_all(joining: Joining, weight: float, joins_m: Array, by_join: Array) -> float:
+    """Squared violations between all pairs on their ways to (vehicles, 3) places, with `weight` times derivatives."""
+    violation = 0.0
+    for a in range(len(joins_m)):
+        for b in range(a):
+            violation += in_contact(joining, a, joins_m[a], b, joins_m[b], weight, by_join[a], by_join[b])
     return violation
 
 

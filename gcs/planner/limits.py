@@ -3,6 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
+from gcs.planner.curves import lengths
 from missions.mission import Mission, Site
 from missions.obstacles import FAR_M
 from missions.world import World
@@ -37,8 +38,8 @@ def join_distance_m(mission: Mission) -> float:
     """How far from a common launch point the vehicles, which stand on pads around it, have joined their curves."""
     if mission.launch_point_m is None:
         return 0.0
-    away_m = [float(np.linalg.norm(np.subtract(vehicle.pad_m, mission.launch_point_m))) for vehicle in mission.vehicles]
-    return max(away_m) + mission.takeoff_height_m
+    pads_m = np.array([vehicle.pad_m for vehicle in mission.vehicles])
+    return float(lengths(pads_m - np.array(mission.launch_point_m)).max()) + mission.takeoff_height_m
 
 
 def clearance_cap_m(mission: Mission, world: World) -> float:

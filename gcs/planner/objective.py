@@ -9,17 +9,15 @@ import numpy.typing as npt
 
 from gcs.planner.curves import lengths
 from gcs.planner.limits import clearance_cap_m, height_cap_m
-from missions import obstacles
 from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
 
 
-def objective(mission: Mission, curves_m: Array, clearance_m: Array) -> float:
-    """f of eq. 13 of (vehicles, m, 3) curves, ENU [m], with (vehicles, m) clearances in the world as it is known."""
-    weights, world = mission.planner, mission.world.as_known()
-    height_m = curves_m[..., 2] - obstacles.terrain_height(curves_m, obstacles.pack(world))
-    reward = weights.clearance_weight * np.minimum(clearance_m, clearance_cap_m(mission, world))
+def objective(mission: Mission, curves_m: Array, clearance_m: Array, height_m: Array) -> float:
+    """f of eq. 13 of (vehicles, m, 3) curves, ENU [m], with (vehicles, m) clearances and heights above the terrain."""
+    weights = mission.planner
+    reward = weights.clearance_weight * np.minimum(clearance_m, clearance_cap_m(mission, mission.world.as_known()))
     reward += weights.height_weight * np.minimum(height_m, height_cap_m(mission))
     sides_m = np.maximum(lengths(np.diff(curves_m, axis=1)), 1e-9)  # one that stays where it is has means, too
     length_m = sides_m.sum(axis=1)

@@ -20,6 +20,8 @@ PROFILE = np.exp(-(np.linspace(0.0, PROFILE_EDGE, PROFILE_STEPS + 1) ** 2))
 """The profile of eq. 23 in units of height and slope: one table serves every peak."""
 
 NEWTON_STEPS = 20
+NEAR_ENOUGH = 1e-4
+"""A Newton step as short as this, in units of the slope, leaves an error of its square."""
 NO_GROUND = 40.0
 """Exponent from which on a peak of eq. 23 is lower than a double can tell."""
 
@@ -155,7 +157,7 @@ def _foot_on_profile(radius: float, up: float, height: float) -> float:
         curvature = 1.0 + dz * dz + (z - up) * (4.0 * u * u - 2.0) * z
         stepped = u - half_slope / curvature if curvature > 0.0 else low - 1.0
         stepped = stepped if low <= stepped <= high else 0.5 * (low + high)
-        if abs(stepped - u) < 1e-7:
-            return stepped
-        u = stepped
+        moved, u = abs(stepped - u), stepped
+        if moved < NEAR_ENOUGH:
+            break
     return u

@@ -10,7 +10,8 @@ from gcs.planner import limits
 from gcs.planner.coupling import Coupling
 from gcs.planner.curve_cost import Terms, sampling
 from gcs.planner.fleet_cost import Problem
-from gcs.planner.representation import LEG_SEGMENTS, Guide, guide_along, pin_weights
+from gcs.planner.joining import Joining
+from gcs.planner.representation import Guide, guide_along, pin_weights, straight_legs
 from missions import obstacles, time_law
 from missions.mission import Mission, Target
 
@@ -25,7 +26,10 @@ MEAN_UNIT_SHARE = 0.1
 
 MOST_SAMPLES = 512
 MOST_CONTROL_POINTS = 24
-"""Of curves that follow a guide path; targets on the way come on top of what the mission says."""
+"""Of curves that follow a guide path, for each leg of a route."""
+
+POINTS_PER_STOP = 6
+"""Control points that a target on the way adds; with four, climbs from target to target often have no room to wind."""
 
 FRACTIONS = 48
 """Fractions of the paths at which vehicles are compared."""
@@ -102,15 +106,20 @@ def guides_along(mission: Mission, ways: Sequence[Way], n_control: int) -> list[
 def guides(mission: Mission, routes: Sequence[Route]) -> list[Guide]:
     """Guides that lead straight from target to target."""
     ways = [route.straight for route in routes]
-    return guides_along(mission, ways, control_points(mission, ways))
+    n_control = control_points(mission, ways)
+    if any(way.stops for way in ways):
+        return guides_along(mission, ways, n_control)
+    begins_m, ends_m = np.array([way.corners_m for way in ways]).transpose(1, 0, 2)
+    bases_m, axes_m = straight_legs(begins_m, ends_m, n_control, mission.world.bounds)
+    return [Guide(*each, pins=np.zeros(0, np.int64)) for each in zip(bases_m, axes_m, strict=True)]
 
 
 def control_points(mission: Mission, ways: Sequence[Way], per_corner: int = 0) -> int:
     """Control points of curves along such ways: as the mission says, more for many targets or to follow corners."""
     most_stops = max(len(way.stops) for way in ways)
-    enough = mission.planner.control_points + (LEG_SEGMENTS + 1) * most_stops
+    enough = mission.planner.control_points + POINTS_PER_STOP * most_stops
     corners = max(len(way.corners_m) for way in ways)
-    return max(enough, min(per_corner * corners, MOST_CONTROL_POINTS))
+    return max(enough, min(per_corner * corners, MOST_CONTROL_POINTS * (1 + most_stops)))
 
 
 def pose(mission: Mission, routes: Sequence[Route], guides: Sequence[Guide], care: Care = Care()) -> Problem:
@@ -131,6 +140,7 @@ def pose(mission: Mission, routes: Sequence[Route], guides: Sequence[Guide], car
         samples=sampling(n_control, care.samples * -(-n_control // MOST_CONTROL_POINTS)),
         terms=_terms(mission, routes, care),
         coupling=_coupling(mission, routes, care),
+        joining=_joining(mission, routes, care),
         obstacles=obstacles.pack(mission.world.as_known()),
     )
 
@@ -184,6 +194,15 @@ def _coupling(mission: Mission, routes: Sequence[Route], care: Care) -> Coupling
         mean_unit_m=MEAN_UNIT_SHARE * min(mean_high_m, _mean_direct_m(routes)),
         first=first,
         last=last,
+    )
+
+
+def _joining(mission: Mission, routes: Sequence[Route], care: Care) -> Joining:
+    pads_m = [mission.vehicle(route.sysid).pad_m for route in routes if mission.launch_point_m is not None]
+    return Joining(
+        hovers_m=np.array(pads_m, dtype=float).reshape(-1, 3) + np.array([0.0, 0.0, mission.takeoff_height_m]),
+        distance_m=limits.join_distance_m(mission),
+        contact_m=2.0 * mission.limits.body_radius_m * (1.0 + care.distance_share),
     )
 
 

@@ -25,7 +25,7 @@ from missions.mission import Mission
 Array = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-QUICK = (Stage(30.0, 20), Stage(1000.0, 20))
+QUICK = (Stage(30.0, 10), Stage(1000.0, 15))
 """Polish of the first particles: a feasible plan soon."""
 LONE_EVALUATIONS = 40
 """Of the first descent of each vehicle."""

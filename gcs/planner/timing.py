@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from gcs.planner.curves import curvature, path_lengths
+from gcs.planner.curves import path_lengths
 from missions import time_law
 from missions.mission import Mission
 
@@ -37,7 +37,7 @@ class Timing:
     held_back: BoolArray
 
 
-def common_timing(mission: Mission, curves_m: Array, clearance_m: Array) -> Timing:
+def common_timing(mission: Mission, curves_m: Array, clearance_m: Array, curvature_1_m: Array) -> Timing:
     """The fastest common progress along the curves under the mission's limits of speed and acceleration.
 
     Both speeds and the sideways acceleration in turns are kept by every vehicle; the acceleration along the path by
@@ -47,12 +47,13 @@ def common_timing(mission: Mission, curves_m: Array, clearance_m: Array) -> Timi
         mission: for its limits.
         curves_m: (vehicles, m, 3) samples, ENU [m].
         clearance_m: (vehicles, m) at them.
+        curvature_1_m: (vehicles, m) likewise.
     """
     kept = mission.limits
     lengths_m = np.maximum(path_lengths(curves_m), 1e-6)
     near = clearance_m < kept.avoidance_distance_m
     speeds_m_s = np.where(near, kept.avoidance_speed_m_s, kept.cruise_speed_m_s)
-    turning_m_s = np.sqrt(kept.acceleration_m_s2 / np.maximum([curvature(curve_m) for curve_m in curves_m], 1e-9))
+    turning_m_s = np.sqrt(kept.acceleration_m_s2 / np.maximum(curvature_1_m, 1e-9))
     allowed_1_s = np.min(speeds_m_s / lengths_m[:, None], axis=0)
     limit_1_s = np.minimum(allowed_1_s, np.min(turning_m_s / lengths_m[:, None], axis=0))
     longest = np.zeros((len(allowed_1_s), 3))

@@ -17,6 +17,8 @@ from missions.mission import load_mission
 from missions.mission_items import MissionItem, Track, encode_track
 from missions.tunnel import CompanionState, PayloadType
 from sitl.dialect import mavlink
+from sitl.microservices.mission_item_codec import int_item
+from sitl.microservices.outbox import Link, Sender
 from tests.integration.sitl_process import GroundStation
 
 COMPANION = Path(sys.executable).with_name("companion")
@@ -128,25 +130,7 @@ class FlightDesk(GroundStation):
         self.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0))
         for seq, item in enumerate(items):
             self.until(lambda seq=seq: [m for m in self._requests(heard) if m.seq == seq])
-            self.send(
-                mavlink.MAVLink_mission_item_int_message(
-                    1,
-                    1,
-                    seq,
-                    item.frame,
-                    item.command,
-                    int(seq == 0),
-                    1,
-                    item.param1,
-                    item.param2,
-                    item.param3,
-                    item.param4,
-                    item.x,
-                    item.y,
-                    item.z,
-                    0,
-                )
-            )
+            self.send(int_item(item, seq, Sender(Link.GROUND, 1, 1), mavlink.MAV_MISSION_TYPE_MISSION))
         ack = self.until(lambda: [m for m in self.listen()[heard:] if m.get_type() == "MISSION_ACK"])
         assert ack[0].type == mavlink.MAV_MISSION_ACCEPTED
 

@@ -20,12 +20,13 @@ RECEIVE_BUFFER_BYTES = 1 << 22
 def free_instance_base() -> int:
     """A shift at which the first ports of all kinds are free."""
     for base in range(2000, 40_000, 300):
-        if all(_is_free(port + base) for port in (14540, 14550, 14580, 14990, 18570)):
+        if all(is_free(port + base) for port in (14540, 14550, 14580, 14990, 18570)):
             return base
     raise AssertionError("no free ports")
 
 
-def _is_free(port: int) -> bool:
+def is_free(port: int) -> bool:
+    """Nobody listens on a UDP port of this machine."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("127.0.0.1", port))

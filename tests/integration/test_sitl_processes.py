@@ -17,7 +17,7 @@ import pytest
 from missions.lidar_packets import unpack
 from missions.ports import companion_port
 from sitl.dialect import mavlink
-from tests.integration.sitl_process import SITL, GroundStation, free_instance_base, running_sitl
+from tests.integration.sitl_process import SITL, GroundStation, free_instance_base, is_free, running_sitl
 
 pytestmark = pytest.mark.processes
 
@@ -231,7 +231,7 @@ def test_with_a_key_everything_for_the_ground_is_signed_and_the_unsigned_has_no_
 
 
 def test_the_companion_gets_the_packets_of_its_lidar():
-    base = next(b for b in range(100, 8900, 300) if _free(56300 + b, 14550 + b, 18570 + b))
+    base = next(b for b in range(100, 8900, 300) if all(is_free(port + b) for port in (56300, 14550, 18570)))
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as companion:
         companion.bind(("127.0.0.1", 56300 + base + 1))
         companion.settimeout(10.0)
@@ -239,16 +239,6 @@ def test_the_companion_gets_the_packets_of_its_lidar():
             packet = unpack(companion.recv(2048))
     assert len(packet.points_flu_m) > 10
     assert np.linalg.norm(packet.points_flu_m, axis=1).max() < 5.5
-
-
-def _free(*ports: int) -> bool:
-    for port in ports:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            try:
-                probe.bind(("127.0.0.1", port))
-            except OSError:
-                return False
-    return True
 
 
 def test_a_lidar_has_no_port_beyond_the_last_one():

@@ -50,7 +50,6 @@ def test_one_seed_is_one_flight_to_the_bit():
 
 @pytest.mark.parametrize("seed", range(2))
 def test_the_companions_alone_find_their_way(seed: int):
-    system = WholeSystem(INDOOR, PlanningMode.ONBOARD, seed=seed)
     alone = msgspec.structs.replace(INDOOR, vehicles=INDOOR.vehicles[:1], allocation={"alpha": "north-east"})
     system = WholeSystem(msgspec.structs.replace(alone, targets=INDOOR.targets[:1]), PlanningMode.ONBOARD, seed=seed)
     report = system.fly()

@@ -88,15 +88,14 @@ def alone(mission: Mission, polygons_m: Sequence[Array]) -> Alone:
     longest_m = max(np.linalg.norm(np.diff(polygon_m, axis=0), axis=1).sum() for polygon_m in polygons_m)
     count = int(np.ceil(longest_m / spacing_m)) + 1
     curves_m = np.array([_resampled(polygon_m, count) for polygon_m in polygons_m])
-    solid = obstacles.pack(mission.world.as_known())
-    clearance_m = np.array([obstacles.clearance(curve_m, solid) for curve_m in curves_m])
-    timing = common_timing(mission, curves_m, clearance_m)
+    measured = feasibility.measure(mission, curves_m)
+    timing = common_timing(mission, curves_m, measured.clearance_m, measured.curvature_1_m)
     curves = [
         TimedCurve(route.name, route.sysid, route.targets, curve_m, timing.times_s)
         for route, curve_m in zip(allocate(mission), curves_m, strict=True)
     ]
-    cost = flown_cost(mission, curves, objective(mission, curves_m, clearance_m))
-    return Alone(cost, len(feasibility.violations(mission, curves)))
+    cost = flown_cost(mission, curves, objective(mission, curves_m, measured.clearance_m, measured.height_m))
+    return Alone(cost, len(feasibility.violations(mission, curves, measured)))
 
 
 def _resampled(polygon_m: Array, count: int) -> Array:

@@ -21,7 +21,7 @@ from companion.settings import CompanionSettings
 from companion.states import State
 from missions.frames import AutopilotFrame
 from missions.mission_items import MissionItem
-from missions.tunnel import PayloadType, Reason
+from missions.tunnel import CompanionStatus, PayloadType, Reason, decode_status
 from tests.simulation import virtual_time
 from tests.unit.companion.rig import GCS, HOME, INDOOR, START_M, StraightPlanner, items_of
 
@@ -37,6 +37,7 @@ class BenchVehicle:
         self.refused = refused
         self.commanded: list[FlightMode] = []
         self.answers: list[tuple[CommandResult, Reason]] = []
+        self.statuses: list[CompanionStatus] = []
         self.streaming = False
         self.closed = False
         self._place_ned_m = FRAME.ned(START_M)
@@ -86,7 +87,8 @@ class BenchVehicle:
         self.answers.append((result, reason))
 
     def send_tunnel(self, kind: PayloadType, payload: bytes) -> None:
-        pass
+        if kind is PayloadType.COMPANION_STATUS:
+            self.statuses.append(decode_status(payload))
 
     def close(self) -> None:
         self.streaming, self.closed = False, True
@@ -202,7 +204,8 @@ def test_an_error_of_its_own_in_flight_leaves_the_vehicle_in_hold():
         return await running
 
     assert not virtual_time.run(fail())
-    assert desk.pilot.state is State.FAILED
+    told = desk.vehicle.statuses[-1]
+    assert (told.state, told.reason) == (State.FAILED, Reason.INTERNAL_ERROR)
     assert desk.vehicle.commanded == [FlightMode.OFFBOARD, FlightMode.HOLD]
     assert (desk.vehicle.closed, desk.deadman.armed) == (True, False)
     assert any("ZeroDivisionError: no such plan" in line for line in desk.said)

@@ -58,6 +58,29 @@ def test_vehicle_time_stands_still_with_a_stalled_simulator():
     assert clock.now_s(13.03) == pytest.approx(50.25)
 
 
+@pytest.mark.parametrize("reached", [1.2, 5.0])
+def test_a_simulator_that_cannot_keep_up_sets_the_pace(reached: float):
+    clock, errors = VehicleClock(10.0), []
+    for k in range(200):
+        loop_s = 5.0 + k * 0.02
+        clock.observe(100.0 + reached * k * 0.02, loop_s)
+        errors.append(clock.now_s(loop_s + 0.01) - (100.0 + reached * (k * 0.02 + 0.01)))
+    assert clock.pace == pytest.approx(reached, rel=0.01)
+    assert np.abs(errors[100:]).max() < 0.01
+
+
+def test_the_pace_comes_back_and_jitter_does_not_change_it():
+    clock, rng = VehicleClock(2.0), np.random.default_rng(4)
+    for k in range(100):
+        clock.observe(0.1 * k, 0.1 * k)
+    assert clock.pace == pytest.approx(1.0, rel=0.01)
+    paces = []
+    for k in range(100):
+        clock.observe(10.0 + 2.0 * 0.1 * k, 10.0 + 0.1 * k + rng.uniform(0.0, 0.02))
+        paces.append(clock.pace)
+    assert set(paces[20:]) == {2.0}
+
+
 def test_a_rebooted_autopilot_sets_the_clock_back():
     clock = VehicleClock(1.0)
     clock.observe(500.0, 10.0)

@@ -2,10 +2,12 @@
 
 import numpy as np
 from scipy.interpolate import BSpline
+from scipy.optimize import brentq
 
 from gcs.planner.coupling import Coupling
 from gcs.planner.curve_cost import Terms
 from gcs.planner.fleet_cost import Problem, all_control_points
+from gcs.planner.joining import Joining
 from missions import bspline, obstacles
 from missions.obstacles import Obstacles
 
@@ -22,7 +24,7 @@ def fleet_cost(problem: Problem, offsets: Array) -> tuple[float, float]:
     ]
     places_m = [places(control_m, len(problem.samples.first), len(problem.coupling.first)) for control_m in controls_m]
     objective, violation = np.sum(costs, axis=0)
-    return objective, violation + between(problem.coupling, places_m)
+    return objective, violation + between(problem.coupling, places_m) + joining(problem.joining, controls_m)
 
 
 def curve_cost(control_m: Array, n_samples: int, terms: Terms, solid: Obstacles, zones_m: Array) -> tuple[float, float]:
@@ -66,6 +68,31 @@ def places(control_m: Array, n_samples: int, n_fractions: int) -> Array:
     flown = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
     at = np.linspace(0.0, flown[-1], n_fractions)
     return np.stack([np.interp(at, flown, points[:, axis]) for axis in range(3)], axis=-1)
+
+
+def joining(joining: Joining, controls_m: Array) -> float:
+    """Violations by vehicles that come too near to one another between their pads and their curves."""
+    share, found = np.linspace(0.0, 1.0, 20001)[:, None], 0.0
+    ways_m = [
+        hover_m + share * (joined_at(control_m, joining.distance_m) - hover_m)
+        for hover_m, control_m in zip(joining.hovers_m, controls_m, strict=False)
+    ]
+    for a in range(len(ways_m)):
+        for b in range(a):
+            apart_m = np.linalg.norm(ways_m[a] - ways_m[b], axis=1).min()
+            found += max(0.0, 1.0 - apart_m / joining.contact_m) ** 2
+    return found
+
+
+def joined_at(control_m: Array, distance_m: float) -> Array:
+    """(3,) the first place of a curve so far from its beginning, or its end."""
+    spline = BSpline(bspline.clamped_knots(len(control_m)), control_m, 3)
+    u = np.linspace(0.0, 1.0, 1001)
+    beyond = np.linalg.norm(spline(u) - control_m[0], axis=1) > distance_m
+    if not beyond.any():
+        return control_m[-1]
+    first = int(np.argmax(beyond))
+    return spline(brentq(lambda at: np.linalg.norm(spline(at) - control_m[0]) - distance_m, u[first - 1], u[first]))
 
 
 def between(coupling: Coupling, places_m: list[Array]) -> float:

@@ -26,11 +26,18 @@ UNCAPPED = msgspec.structs.replace(load_mission("terrain-1-5uav").planner, clear
 
 NARROW = msgspec.structs.replace(load_mission("terrain-1-5uav").limits, turn_radius_m=900.0, climb_angle_deg=6.0)
 
+LAUNCH = load_mission("terrain-1-5uav")
+BULKY = msgspec.structs.replace(
+    LAUNCH, limits=msgspec.structs.replace(LAUNCH.limits, body_radius_m=6.0), takeoff_height_m=40.0
+)
+"""Five vehicles from one launch point that touch on the way from their pads to their curves."""
+
 MISSIONS = {
     "every kind of obstacle": everything(),
     "no caps": everything(planner=UNCAPPED),
     "time slack and a tight gap": room(wall(10.0, (6.5, 8.0))),
     "wide turns and gentle climbs": everything(limits=NARROW),
+    "from pads around a launch point": BULKY,
     "one vehicle": load_mission("field"),
     "targets on the way": round_trip(),
     "routes of unequal length": msgspec.structs.replace(

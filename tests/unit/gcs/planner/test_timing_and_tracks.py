@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from gcs.planner import feasibility
 from gcs.planner.curves import cross, curvature, dense_curves, path_lengths
 from gcs.planner.timing import Timing, common_timing
 from gcs.planner.track_points import MOST_POINTS, sample_track, thin
@@ -37,8 +38,8 @@ def douglas_peucker(curve_m: np.ndarray, begin: int, end: int, tolerance_m: floa
 
 
 def timed(mission: Mission, curves_m: np.ndarray) -> Timing:
-    solid = obstacles.pack(mission.world.as_known())
-    return common_timing(mission, curves_m, np.array([obstacles.clearance(curve_m, solid) for curve_m in curves_m]))
+    measured = feasibility.measure(mission, curves_m)
+    return common_timing(mission, curves_m, measured.clearance_m, measured.curvature_1_m)
 
 
 GAP = room(wall(10.0, (5.2, 6.8)), pads_m=((1.0, 6.0, 0.0),), targets_m=((19.0, 6.0, 1.5),))
