@@ -17,8 +17,12 @@ Array = npt.NDArray[np.float64]
 FAR_M = 1e6
 """The clearance of a world with nothing in it [m]."""
 
-PROFILE_SAMPLES = 12
-"""Points of a peak's profile that are looked at before the nearest one is sharpened ..."""
+PROFILE_STEPS = 32
+PROFILE_EDGE = float(np.sqrt(-np.log(BASE_HEIGHT_SHARE)))
+"""Radius of a peak's foot in units of its slope."""
+PROFILE = np.exp(-(np.linspace(0.0, PROFILE_EDGE, PROFILE_STEPS + 1) ** 2))
+"""The profile of eq. 23 in units of height and slope: one table serves every peak. The nearest point is looked for
+among these; it is sharpened ..."""
 NEAR_ENOUGH = 1e-5
 """... until it moves by no more than this share of the slope; the distance is off by the square of that."""
 
@@ -57,11 +61,8 @@ def clearance(points_enu_m: Array, obstacles: Obstacles) -> Array:
 
 def terrain_height(points_enu_m: Array, obstacles: Obstacles) -> Array:
     """Height of the ground [m] below (n, 2 or 3) ENU points: the sum of all peaks (eq. 23)."""
-    points = np.asarray(points_enu_m, dtype=float)
-    east, north = points[..., 0, None], points[..., 1, None]
-    peaks = obstacles.peaks
-    squared = (east - peaks[:, 0]) ** 2 + (north - peaks[:, 1]) ** 2
-    return np.sum(peaks[:, 3] * np.exp(-squared / peaks[:, 2] ** 2), axis=-1)
+    points = np.ascontiguousarray(points_enu_m, dtype=float)
+    return _terrain_below_points(points.reshape(-1, points.shape[-1]), obstacles).reshape(points.shape[:-1])
 
 
 @compiled
@@ -69,6 +70,14 @@ def _clearance_of_points(points_enu_m: Array, obstacles: Obstacles) -> Array:
     out = np.empty(len(points_enu_m))
     for i in range(len(points_enu_m)):
         out[i] = clearance_at(points_enu_m[i, 0], points_enu_m[i, 1], points_enu_m[i, 2], obstacles)
+    return out
+
+
+@compiled
+def _terrain_below_points(points_enu_m: Array, obstacles: Obstacles) -> Array:
+    out = np.empty(len(points_enu_m))
+    for i in range(len(points_enu_m)):
+        out[i] = terrain_height_at(points_enu_m[i, 0], points_enu_m[i, 1], obstacles)
     return out
 
 
@@ -141,16 +150,15 @@ def _to_peak(east: float, north: float, up: float, peak: Array, nearer_than: flo
     level = min(max(up, BASE_HEIGHT_SHARE * height), height)
     beside = slope * np.sqrt(np.log(height / level))
     low, high = min(radius, beside), min(max(radius, beside), foot)
-    spacing = (high - low) / PROFILE_SAMPLES
+    spacing = slope * PROFILE_EDGE / PROFILE_STEPS
     best, nearest_u = np.inf, low
-    for i in range(PROFILE_SAMPLES + 1):
-        u = low + i * spacing
-        z = height * np.exp(steepness * u * u)
-        squared = (u - radius) ** 2 + (z - up) ** 2
+    for i in range(int(low / spacing), min(int(high / spacing) + 1, PROFILE_STEPS) + 1):
+        across, along = i * spacing - radius, height * PROFILE[i] - up
+        squared = across * across + along * along
         if squared < best:
-            best, nearest_u = squared, u
+            best, nearest_u = squared, i * spacing
     low, high = max(low, nearest_u - spacing), min(high, nearest_u + spacing)
-    u = nearest_u
+    u = min(max(nearest_u, low), high)
     for _ in range(30):
         z = height * np.exp(steepness * u * u)
         dz = 2.0 * steepness * u * z
@@ -166,6 +174,6 @@ def _to_peak(east: float, north: float, up: float, peak: Array, nearer_than: flo
         moved, u = abs(stepped - u), stepped
         if moved < NEAR_ENOUGH * slope:
             break
-    best = min(best, (u - radius) ** 2 + (height * np.exp(steepness * u * u) - up) ** 2)
+    best = (u - radius) ** 2 + (height * np.exp(steepness * u * u) - up) ** 2
     inside = radius < foot and up < height * np.exp(steepness * radius * radius)
     return -np.sqrt(best) if inside else np.sqrt(best)

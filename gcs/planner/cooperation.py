@@ -5,6 +5,7 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
+from gcs.planner.curve_cost import sampling
 from gcs.planner.ecpso import Ecpso, EcpsoSettings
 from gcs.planner.fleet_cost import Context, Problem, no_others, set_context, swarm_cost
 from gcs.planner.lone_descent import alone, descend_alone
@@ -17,6 +18,8 @@ LONE_STRICTNESS = 10.0
 """Factor on the weight of violations in descents of single vehicles."""
 LONE_STARTS = 3
 """First particles that are tried, where descents from the better ones do not lead to a flyable curve."""
+RANKING_SAMPLES = 32
+"""Of the first particles, where these only have to be put in order: half of what the descents look at."""
 SWEEPS = 2
 """How often every vehicle chooses among the first particles before the search begins."""
 
@@ -75,7 +78,8 @@ class Cooperation:
     def _best_alone(self, vehicle: int, most: int, enough: float) -> float:
         """Set one vehicle's offsets, and return the violation that is left."""
         strict = alone(stricter(self.problem, LONE_STRICTNESS), vehicle)
-        order = np.argsort(self._costs(vehicle, self._first, no_others()), kind="stable")
+        coarse = self.problem._replace(samples=sampling(self.problem.base_m.shape[1], RANKING_SAMPLES))
+        order = np.argsort(self._costs(vehicle, self._first, no_others(), coarse), kind="stable")
         least = np.inf
         for start in order[:LONE_STARTS]:
             offsets, cost, violation = self._first[start : start + 1].copy(), np.empty(1), np.empty(1)
@@ -140,8 +144,10 @@ class Cooperation:
         self.offsets[vehicle] = offsets
         set_context(self.problem, vehicle, offsets, self._others())
 
-    def _costs(self, vehicle: int, positions: Array, context: Context | None = None) -> Array:
+    def _costs(
+        self, vehicle: int, positions: Array, context: Context | None = None, problem: Problem | None = None
+    ) -> Array:
         objective, violation = np.empty(len(positions)), np.empty(len(positions))
-        swarm_cost(self.problem, vehicle, positions, context or self._others(), objective, violation)
+        swarm_cost(problem or self.problem, vehicle, positions, context or self._others(), objective, violation)
         self.curve_evaluations += len(positions)
         return objective + self.problem.terms.penalty_weight * violation

@@ -8,16 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from missions.kernels import compiled
-from missions.obstacles import FAR_M, Obstacles
+from missions.obstacles import FAR_M, PROFILE, PROFILE_EDGE, PROFILE_STEPS, Obstacles
 from missions.world import BASE_HEIGHT_SHARE
 
 Array = npt.NDArray[np.float64]
-
-PROFILE_STEPS = 32
-PROFILE_EDGE = float(np.sqrt(-np.log(BASE_HEIGHT_SHARE)))
-"""Radius of a peak's foot in units of its slope."""
-PROFILE = np.exp(-(np.linspace(0.0, PROFILE_EDGE, PROFILE_STEPS + 1) ** 2))
-"""The profile of eq. 23 in units of height and slope: one table serves every peak."""
 
 NEWTON_STEPS = 20
 NEAR_ENOUGH = 1e-4

@@ -62,6 +62,13 @@ def test_compiled_clearance_equals_distances_to_densely_sampled_surfaces(seed: i
     np.testing.assert_allclose(clearance(sample, pack(WORLD)), brute_force(sample, WORLD), atol=2e-3)
 
 
+def test_of_two_nearly_equal_ways_to_a_high_peak_the_shorter_one_counts():
+    """From above a flank the way down to it may be as long as the way across to it."""
+    world = World(bounds=BOUNDS, peaks=(Peak(name="high", centre_m=(0, 0), radius_m=200),))
+    sample = np.random.default_rng(4).uniform([0, 0, 0], [260, 0.1, 700], (600, 3))
+    np.testing.assert_allclose(clearance(sample, pack(world)), brute_force(sample, world), atol=0.05)
+
+
 def test_clearance_is_negative_inside_and_zero_on_the_surface():
     solid = pack(WORLD)
     inside_surface_outside = np.array([[50, 50, 10], [55, 50, 10], [60, 50, 10]], dtype=float)
