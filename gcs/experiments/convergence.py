@@ -12,9 +12,8 @@ from gcs.experiments.markdown import table
 from gcs.experiments.paper import ALGORITHMS
 from gcs.experiments.series import from_cell, to_cell
 from gcs.experiments.statistics import numbers, quartiles, select, spread
-from gcs.experiments.table2 import EVALUATIONS
-from gcs.experiments.trials import PAPER_POPULATION, Course, Trial, attempt
-from gcs.planner.baselines import Representation
+from gcs.experiments.table2 import EVALUATIONS, search
+from gcs.experiments.trials import PAPER_POPULATION, Course
 
 MISSION = "terrain-1-5uav"
 POINTS = 200
@@ -32,9 +31,7 @@ def runs(seeds: Sequence[int]) -> list[Run]:
 
 def work(run: Run) -> Row:
     """One search."""
-    representation = Representation(run.text("representation"))
-    most = EVALUATIONS[representation.value]
-    outcome = attempt(Trial(MISSION, run.text("algorithm"), representation, most, run.number("seed")))
+    outcome, most = search(MISSION, run), EVALUATIONS[run.text("representation")]
     return {
         "ibc": outcome.course.converged_after() / PAPER_POPULATION,
         "cost": outcome.course.final,

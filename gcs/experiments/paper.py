@@ -42,7 +42,7 @@ _TERRAINS = {
 }
 
 BEST_KNOWN = {
-    "terrain-1-5uav": 1419.4,
+    "terrain-1-5uav": 1419.2,
     "terrain-2-5uav": 1488.3,
     "terrain-3-5uav": 1530.7,
     "terrain-1-10uav": 2796.1,

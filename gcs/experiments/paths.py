@@ -11,9 +11,8 @@ from gcs.experiments.markdown import table
 from gcs.experiments.scenery import draw_world
 from gcs.experiments.series import from_cell, to_cell
 from gcs.experiments.statistics import numbers, select, spread
-from gcs.experiments.table2 import EVALUATIONS
-from gcs.experiments.trials import Trial, attempt, uncapped
-from gcs.planner.baselines import Representation
+from gcs.experiments.table2 import EVALUATIONS, search
+from gcs.experiments.trials import uncapped
 from gcs.planner.curves import curvature, path_lengths
 
 MISSION = "terrain-1-5uav"
@@ -30,9 +29,7 @@ def runs(seeds: Sequence[int]) -> list[Run]:
 
 def work(run: Run) -> Row:
     """One search; the plan is kept as samples of all curves, one after the other."""
-    representation = Representation(run.text("representation"))
-    evaluations = EVALUATIONS[representation.value]
-    outcome = attempt(Trial(MISSION, run.text("algorithm"), representation, evaluations, run.number("seed")))
+    outcome = search(MISSION, run)
     curves_m = np.array([curve.curve_m for curve in outcome.candidate.curves])
     picked = np.linspace(0, curves_m.shape[1] - 1, DRAWN_SAMPLES).round().astype(int)
     return {

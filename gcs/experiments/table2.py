@@ -22,7 +22,7 @@ from gcs.experiments.statistics import (
     significance,
     spread,
 )
-from gcs.experiments.trials import PAPER_EVALUATIONS, PAPER_POPULATION, Trial, attempt, attempt_shipped
+from gcs.experiments.trials import PAPER_EVALUATIONS, PAPER_POPULATION, Outcome, Trial, attempt, attempt_shipped
 from gcs.planner.baselines import Representation
 
 OFFSETS_EVALUATIONS = 6000
@@ -55,10 +55,7 @@ def work(run: Run) -> Row:
         plan, course = attempt_shipped(mission, seed)
         objective, feasible, cpu_s, evaluations = plan.objective, plan.feasible, plan.cpu_s, float(plan.evaluations)
     else:
-        representation = Representation(run.text("representation"))
-        outcome = attempt(
-            Trial(mission, run.text("algorithm"), representation, EVALUATIONS[representation.value], seed)
-        )
+        outcome = search(mission, run)
         course, cpu_s, evaluations = outcome.course, outcome.cpu_s, outcome.evaluations
         objective, feasible = outcome.candidate.objective, not outcome.candidate.violations
     first = course.first_feasible()
@@ -72,6 +69,13 @@ def work(run: Run) -> Row:
         "cpu_s": cpu_s,
         "cpu_near_best_s": course.cpu_to(near),
     }
+
+
+def search(mission: str, run: Run) -> Outcome:
+    """The search that a run's algorithm, representation and seed stand for, with the evaluations of table 2."""
+    representation = Representation(run.text("representation"))
+    most = EVALUATIONS[representation.value]
+    return attempt(Trial(mission, run.text("algorithm"), representation, most, run.number("seed")))
 
 
 def summary(rows: Sequence[Row]) -> str:
