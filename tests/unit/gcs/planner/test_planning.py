@@ -119,7 +119,7 @@ PARTS = [field.name for field in dataclasses.fields(SearchSettings) if field.nam
 
 @pytest.mark.parametrize("part", PARTS)
 def test_every_part_of_the_search_can_be_switched_off_and_changes_what_is_found(part: str):
-    mission = room(wall(10.0, (2.0, 4.0)), pads_m=((1.0, 9.0, 0.0), (1.0, 12.0, 0.0)))
+    mission = room(wall(10.0, (3.0, 5.0)))
     whole = plan_mission(mission, evaluations=800)
     without = plan_mission(mission, evaluations=800, settings=dataclasses.replace(SearchSettings(), **{part: False}))
     assert whole.feasible
