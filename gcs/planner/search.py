@@ -42,7 +42,7 @@ STUCK = 1e-2
 """A vehicle that cannot get below this sum of squared violations alone is given a guide path at once."""
 LOOKS_FEASIBLE = 1e-4
 """A plan with a smaller sum of squared violations, sampled and with margins, is shown to the judge, ..."""
-SHOULD_BE_FEASIBLE = 1e-6
+SHOULD_BE_FEASIBLE = 3e-6
 """... but first mended if it has more than this."""
 WORTH_JUDGING = 1e-3
 """Relative gain over the best plan so far that makes the judge look before the end."""
