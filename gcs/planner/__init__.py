@@ -11,7 +11,7 @@ Layers, each importing only what stands below it:
     timing, track_points, objective      times, track points and eq. 13 of dense curves
     lone_descent, refinement, lbfgs      descents of single vehicles, and of the whole plan
     problem, representation              a mission as numbers
-    fleet_cost, coupling, curve_cost, obstacle_gradient    compiled costs with gradients
+    fleet_cost, coupling, joining, curve_cost, obstacle_gradient    compiled costs with gradients
     ecpso, plan, limits, budget, curves  the swarm itself; plain data, definitions, geometry
 """
 
