@@ -8,8 +8,6 @@ import pytest
 from missions.mission import SHIPPED, shipped_missions
 from tests.integration import programs
 
-pytestmark = pytest.mark.processes
-
 
 @pytest.mark.parametrize(
     "program", [("gcs",), ("gcs", "fly"), ("gcs", "plan"), ("gcs", "watch"), ("sitl",), ("companion",)]
@@ -59,6 +57,7 @@ def test_a_broken_mission_file_is_named_with_its_line(tmp_path: Path):
         assert "Traceback" not in finished.output
 
 
+@pytest.mark.processes
 def test_a_fault_of_the_simulator_is_handed_to_it_and_its_complaint_is_handed_back():
     ports = ("--instance-base", str(programs.instance_base()))
     finished = programs.run("gcs", "fly", "indoor", "--sim", "--headless", "--fault", "reboot:vehicle=9", *ports)

@@ -10,8 +10,6 @@ import pytest
 
 from tests.integration import programs
 
-pytestmark = pytest.mark.processes
-
 PATIENCE_S = 120.0
 
 
@@ -30,6 +28,7 @@ def test_an_experiment_writes_rows_a_summary_and_a_picture(tmp_path: Path):
     assert (tmp_path / "ackley.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.processes
 def test_ctrl_c_leaves_whole_rows_and_no_processes_and_the_next_start_goes_on(tmp_path: Path):
     arguments = ("gcs", "experiment", "ackley", "--runs", "300", "--output", str(tmp_path))
     experiment = subprocess.Popen(programs.command(*arguments), stderr=subprocess.PIPE, text=True)

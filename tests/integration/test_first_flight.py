@@ -71,9 +71,11 @@ def taken_over_s(directory: Path) -> float:
 SEEDED_TIMES_S = np.random.default_rng(2).uniform(0.8, 6.5, 5).round(2).tolist()
 
 
-@pytest.mark.parametrize("kind", ["companion-kill", "companion-hang"])
+FAULTS = [(kind, at_s) for at_s in SEEDED_TIMES_S for kind in ("companion-hang", "companion-kill")]
+
+
 @pytest.mark.parametrize(
-    "at_s", [SEEDED_TIMES_S[0], *(pytest.param(at_s, marks=pytest.mark.slow) for at_s in SEEDED_TIMES_S[1:])]
+    ("kind", "at_s"), [FAULTS[0], *(pytest.param(*fault, marks=pytest.mark.slow) for fault in FAULTS[1:])]
 )
 def test_a_companion_that_dies_or_hangs_leaves_its_vehicle_holding(tmp_path: Path, kind: str, at_s: float):
     finished = programs.fly(tmp_path, "--fault", f"{kind}:vehicle=1,at_s={at_s}")
