@@ -13,7 +13,7 @@ from gcs.errors import UsageError
 from gcs.planner_process import end_with_parent
 
 SCHEDULER = re.compile(r"(tcp|tls)://[^/\s:]+:\d{1,5}")
-CONNECT_TIMEOUT_S = 5
+CONNECT_TIMEOUT_S = 10
 ONE_THREAD: dict[str, str] = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment of workers: one run is one thread, so that its CPU time means something."""
 

@@ -160,10 +160,9 @@ PEERS: dict[str, Peer] = {
 """By the name under which they are reported."""
 
 ON_OUR_GRADIENTS = ("scipy SLSQP", "scipy L-BFGS-B", "scipy L-BFGS-B, straight")
-"""These live on the product's hand-made derivatives, which are half of the product: they are shown beside it, and no
-peers that it has to be ahead of (docs/decisions/0018-who-is-a-peer.md) ..."""
+"""These live on the product's hand-made derivatives: peers all the same (docs/decisions/0018-who-is-a-peer.md) ..."""
 OURS_BUT_FOR_THE_DESCENT = ("scipy L-BFGS-B, straight",)
-"""... and this one lives on its first plan and stages, too."""
+"""... and this one on its first plan and stages, too: it is shown, and no peer that the product has to be ahead of."""
 
 
 def run_peer(name: str, task: Task, seed: int, limits: Limits, spent_s: float = 0.0) -> Attempt:
