@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from gcs.dialect import Message, enum_name, mavlink
 from gcs.errors import CommandRefused, LinkLost
 from gcs.microservices import Backoff
+from missions.frames import GeodeticPoint
+from missions.mission_items import DEG_E7
 
 FIRST_TIMEOUT_S = 0.5
 ATTEMPTS = 10
@@ -29,6 +31,22 @@ class Command:
     def message(self, peer: tuple[int, int], confirmation: int) -> Message:
         params = (*self.params, *(0.0,) * (7 - len(self.params)))
         return mavlink.MAVLink_command_long_message(*peer, self.number, confirmation, *params)
+
+
+@dataclass(frozen=True)
+class PlaceCommand(Command):
+    """One COMMAND_INT: parameters 1 to 4, and a place that a float32 could not carry; its altitude is AMSL."""
+
+    place: GeodeticPoint | None = None
+
+    def message(self, peer: tuple[int, int], confirmation: int) -> Message:
+        assert self.place is not None
+        params = (*self.params, *(0.0,) * (4 - len(self.params)))
+        latitude_e7, longitude_e7 = round(self.place.latitude_deg * DEG_E7), round(self.place.longitude_deg * DEG_E7)
+        frame, altitude_m = mavlink.MAV_FRAME_GLOBAL, self.place.altitude_amsl_m
+        return mavlink.MAVLink_command_int_message(
+            *peer, frame, self.number, 0, 0, *params, latitude_e7, longitude_e7, altitude_m
+        )
 
 
 @dataclass
