@@ -1,4 +1,4 @@
-"""What is left of a mission in flight, as a mission of its own: from where vehicles are, in the world as it was seen."""
+"""What is left of a mission in flight, as a mission of its own: from where vehicles are, in the world as seen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
