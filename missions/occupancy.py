@@ -54,6 +54,11 @@ def voxels_of(points_enu_m: Array, voxel_m: float) -> IntArray:
     return np.floor(np.asarray(points_enu_m, dtype=float) / voxel_m).astype(np.int64)
 
 
+def centres_of(voxels: IntArray, voxel_m: float) -> Array:
+    """(n, 3) centres [m], ENU, of the voxels with (n, 3) indices."""
+    return np.asarray((voxels + 0.5) * voxel_m, dtype=np.float64)
+
+
 def blocks_of(voxels: IntArray) -> dict[BlockIndex, BoolArray]:
     """(n, 3) voxel indices sorted into blocks: index -> (8, 8, 8) occupied."""
     blocks: dict[BlockIndex, BoolArray] = {}

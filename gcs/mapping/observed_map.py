@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from missions.occupancy import BLOCK_VOXELS, BlockIndex, OccupancyBlock
+from missions.occupancy import BLOCK_VOXELS, BlockIndex, OccupancyBlock, centres_of
 from missions.world import Bounds, Box
 
 Array = npt.NDArray[np.float64]
@@ -81,12 +81,12 @@ class ObservedMap:
     @property
     def points_enu_m(self) -> Array:
         """(n, 3) centres of the occupied voxels, ENU [m]."""
-        return (self.voxels + 0.5) * self.voxel_m
+        return centres_of(self.voxels, self.voxel_m)
 
     def points_of(self, sysid: int) -> Array:
         """(n, 3) centres of the voxels that one vehicle has reported as occupied, ENU [m]."""
         seen = [report.block.voxels for report in self._reports.get(sysid, {}).values()]
-        return (np.concatenate(seen) + 0.5) * self.voxel_m if seen else np.empty((0, 3))
+        return centres_of(np.concatenate(seen), self.voxel_m) if seen else np.empty((0, 3))
 
     def boxes(self) -> tuple[Box, ...]:
         """The occupied voxels as few boxes, gaps of one voxel between them filled, as a planner reads obstacles."""
@@ -141,4 +141,5 @@ def _closed(voxels: IntArray) -> IntArray:
     low = voxels.min(axis=0) - 1
     grid = np.zeros(voxels.max(axis=0) - low + 2, np.bool_)
     grid[tuple((voxels - low).T)] = True
-    return np.argwhere(ndimage.binary_closing(grid, np.ones((3, 3, 3), np.bool_)) | grid) + low
+    closed = np.asarray(ndimage.binary_closing(grid, np.ones((3, 3, 3), np.bool_)), np.bool_)
+    return np.argwhere(closed | grid) + low
