@@ -41,11 +41,12 @@ class PlaceCommand(Command):
 
     def message(self, peer: tuple[int, int], confirmation: int) -> Message:
         assert self.place is not None
-        params = (*self.params, *(0.0,) * (4 - len(self.params)))
-        latitude_e7, longitude_e7 = round(self.place.latitude_deg * DEG_E7), round(self.place.longitude_deg * DEG_E7)
-        frame, altitude_m = mavlink.MAV_FRAME_GLOBAL, self.place.altitude_amsl_m
+        one, two, three, four = (*self.params, *(0.0,) * (4 - len(self.params)))
+        x, y = round(self.place.latitude_deg * DEG_E7), round(self.place.longitude_deg * DEG_E7)
+        frame, z_m = mavlink.MAV_FRAME_GLOBAL, self.place.altitude_amsl_m
+        system, component = peer
         return mavlink.MAVLink_command_int_message(
-            *peer, frame, self.number, 0, 0, *params, latitude_e7, longitude_e7, altitude_m
+            system, component, frame, self.number, 0, 0, one, two, three, four, x, y, z_m
         )
 
 
