@@ -10,6 +10,8 @@ from pathlib import Path
 import msgspec
 
 from gcs.desk import Desk
+from gcs.desk.desk import PlannerChoice
+from gcs.desk.intents import NewMission
 from gcs.errors import GcsError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.picture import draw_flight
@@ -18,36 +20,41 @@ from gcs.flight.preparation import CONNECT_TIMEOUT_S
 from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
 from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
+from gcs.link.simulator_control import ControlPort
 from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
-from gcs.settings import Autopilots, FlightSettings, OriginHere
+from gcs.programs import FlightPrograms
+from gcs.settings import Autopilots, FlightSettings, OriginHere, PlanningMode
 from gcs.station import Station
 from missions.errors import MissionError
-from missions.faults import format_fault
+from missions.frames import GeodeticPoint
 from missions.mission import Mission
 
 TRAIL_INTERVAL_S = 0.05
 HOLD_TIMEOUT_S = 5.0
-TRUTH_FILE = "truth.csv"
+REPORT_INTERVAL_S = 0.2
 
 BROWSER_TIMEOUT_S = 15.0
 """A flight with a page waits for a browser, but not longer than this [s]."""
+COUNTDOWN_S = 8.0
+"""What an operator who has just opened the page has to say that they will do it themselves [s]."""
 
 Page = Callable[[Desk, asyncio.Event], Coroutine[None, None, None]]
 """Serves the web page of a desk until it is cancelled; sets the event when the first browser shows it."""
 
 
 class FlightApp:
-    """One flight with everything around it.
+    """One session with everything around it: one flight, or with a page as many as the operator loads.
 
     Args:
         settings: what the operator chose.
         mission: as it was read.
         planner: makes the cloud's plan.
         events: where everything of note is written.
-        work_dir: for the report and the logs of all programs.
+        work_dir: for the report and the logs of all programs; further flights have folders of their own in it.
         page: serves the web page; None for a headless run, which ends when the flight has ended.
+        choice: the planner, as far as it can be chosen on the page.
     """
 
     def __init__(
@@ -58,22 +65,25 @@ class FlightApp:
         events: EventLog,
         work_dir: Path,
         page: Page | None = None,
+        choice: PlannerChoice | None = None,
     ) -> None:
-        self.settings, self.work_dir, self._page = settings, work_dir, page
-        station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
-        flight = FleetFlight(
-            station=station,
-            mission=mission,
-            mode=settings.mode,
-            planner=planner,
-            events=events,
-            speed=settings.speed,
-            unattended=page is None,
+        self.settings, self.work_dir, self.events = settings, work_dir, events
+        self._planner, self._page = planner, page
+        self.station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+        self.programs = FlightPrograms(settings, settings.mission, events, work_dir)
+        self.flight = self._new_flight(mission, settings.mode)
+        self.desk = Desk(
+            self.station,
+            events,
+            self.flight,
+            Trails(mission.frame),
+            simulated=self._simulated,
+            opener=self.open if page is not None else None,
+            planner=choice,
+            simulator=ControlPort(settings.instance_base) if self._simulated else None,
         )
-        self.flight, self.station, self.events = flight, station, events
-        simulated = settings.autopilots is Autopilots.SIMULATED
-        self.desk = Desk(station, events, flight, Trails(mission.frame), simulated=simulated)
         self.report: FlightReport | None = None
+        self._flights = 1
         self._first_browser = asyncio.Event()
         self._started_s = time.monotonic()
 
@@ -94,6 +104,51 @@ class FlightApp:
             self.events.add("failed", reason, severity=Severity.ERROR)
         return self.report or self._write_report(reason)
 
+    async def open(self, new: NewMission | None, mode: PlanningMode | None) -> None:
+        """Put another mission onto the desk, or the same one in another mode; its programs are started.
+
+        Raises:
+            LinkLost: with `--origin here`, no vehicle was heard.
+        """
+        mode = mode or self.flight.mode
+        if new is None and mode is self.flight.mode:
+            return
+        mission, source = (new.mission, new.source) if new else (self.flight.mission, self.programs.source)
+        await self.programs.end()
+        self._flights += 1
+        log_dir = self.work_dir / f"flight-{self._flights}"
+        log_dir.mkdir(exist_ok=True)
+        if new is not None and new.content is not None:
+            source = str(log_dir / f"{mission.name}.yaml")
+            await asyncio.to_thread(Path(source).write_bytes, new.content)
+        self.programs = FlightPrograms(self.settings, source, self.events, log_dir)
+        if self._simulated:
+            self.station.forget()
+        if isinstance(self.settings.origin, GeodeticPoint):
+            mission = mission.moved_to(self.settings.origin)
+        self.flight = self.desk.flight = self._new_flight(mission, mode)
+        self.desk.trails = Trails(mission.frame)
+        self.desk.plan_progress.clear()
+        self.desk.observations.histories.clear()
+        self.report, self._started_s = None, time.monotonic()
+        self.events.add("loaded", f"mission {mission.name}, {len(mission.vehicles)} vehicles, mode {mode.value}")
+        await self._start_programs()
+
+    @property
+    def _simulated(self) -> bool:
+        return self.settings.autopilots is Autopilots.SIMULATED
+
+    def _new_flight(self, mission: Mission, mode: PlanningMode) -> FleetFlight:
+        return FleetFlight(
+            station=self.station,
+            mission=mission,
+            mode=mode,
+            planner=self._planner,
+            events=self.events,
+            speed=self.settings.speed,
+            unattended=self._page is None,
+        )
+
     async def _run_everything(self) -> None:
         async with AsyncExitStack() as stack:
             assert self.station.recording is not None
@@ -102,42 +157,31 @@ class FlightApp:
                 connection = await open_udp(url, self.station.receive)
                 stack.callback(connection.close)
                 self.station.connections.append(connection)
-            simulator = await stack.enter_async_context(Processes(self.work_dir))
-            companions = await stack.enter_async_context(Processes(self.work_dir))
-            async with asyncio.TaskGroup() as group:
+            stack.push_async_callback(self._end_programs)
+            async with asyncio.TaskGroup() as self._group:
                 background = [
-                    group.create_task(self.station.send_heartbeats(), name="heartbeats"),
-                    group.create_task(self._sample_trails(), name="trails"),
+                    self._group.create_task(self.station.send_heartbeats(), name="heartbeats"),
+                    self._group.create_task(self._sample_trails(), name="trails"),
                 ]
                 if self._page is not None:
-                    background.append(group.create_task(self._page(self.desk, self._first_browser), name="page"))
-                if self.settings.autopilots is Autopilots.SIMULATED:
-                    child = await self._start_simulator(simulator)
-                    background.append(group.create_task(simulator.watch(child), name="watch the simulator"))
-                await self._settle_origin()
-                if self.settings.starts_companions:
-                    for child in await self._start_companions(companions):
-                        background.append(group.create_task(self._watch_companion(companions, child)))
+                    background.append(self._group.create_task(self._page(self.desk, self._first_browser), name="page"))
+                    background.append(self._group.create_task(self._write_reports(), name="reports"))
+                await self._start_programs()
                 await self._fly()
-                for task in background:
+                for task in background + self.programs.watches:
                     task.cancel()
 
     async def _fly(self) -> None:
-        """The flight, and with a page what the operator does before and after it."""
+        """The flight, and with a page whatever the operator does until the session is ended."""
         try:
             if self._page is not None:
-                await self._wait_for_browser()
+                await self._serve_operator()
             await self.desk.fly()
             self.report = self._write_report("")
-            if self._page is not None:
-                await asyncio.Event().wait()
         except GcsError as problem:
             await self._leave_holding(str(problem))
             self.report = self._write_report(str(problem))
-            if self._page is None:
-                raise
-            self.events.add("failed", str(problem), severity=Severity.ERROR)
-            await asyncio.Event().wait()
+            raise
         except BaseException as ended:  # Ctrl-C, a simulator that died, or a defect: nothing is left to itself
             cancelled = isinstance(ended, asyncio.CancelledError)
             await self._leave_holding("interrupted" if cancelled else f"interrupted ({type(ended).__name__})")
@@ -145,12 +189,27 @@ class FlightApp:
         finally:
             await self.desk.close()
 
-    async def _wait_for_browser(self) -> None:
-        self.events.add("page", f"page: http://{self.settings.host}:{self.settings.port}")
+    async def _serve_operator(self) -> None:
+        """In the simulator the flight begins by itself, unless the operator takes over; on real vehicles never."""
+        self.events.add("page", f"page: {self.settings.page_url}")
+        if self._simulated and not self.settings.waits and await self._nobody_takes_over():
+            try:
+                await self.desk.fly()
+            except GcsError as problem:
+                await self._leave_holding(str(problem))
+                self.report = self._write_report(str(problem))
+                self.events.add("failed", str(problem), severity=Severity.ERROR)
+        await asyncio.Event().wait()
+
+    async def _nobody_takes_over(self) -> bool:
+        """Wait for a browser and for its operator; True if the flight is to begin by itself."""
         self.events.add("page", f"the flight begins when a browser shows it, or in {BROWSER_TIMEOUT_S:g} s")
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(BROWSER_TIMEOUT_S):
-                await self._first_browser.wait()
+        if await _is_set(self._first_browser, BROWSER_TIMEOUT_S):
+            self.desk.begins_s = self.station.now_s + COUNTDOWN_S
+            self.events.add("page", f"the flight begins by itself in {COUNTDOWN_S:g} s, unless an operator takes over")
+            await _is_set(self.desk.taken_over, COUNTDOWN_S)
+            self.desk.begins_s = None
+        return not self.desk.taken_over.is_set()
 
     async def _leave_holding(self, why: str) -> None:
         if not self.flight.in_flight:
@@ -162,34 +221,20 @@ class FlightApp:
             orders.cancel()
             self.events.add("hold", "not every vehicle confirmed Hold", severity=Severity.ERROR)
 
-    async def _start_simulator(self, processes: Processes) -> Child:
-        settings = self.settings
-        self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in half a minute")
-        options = ["--seed", str(settings.seed), "--truth", str(self.work_dir / TRUTH_FILE)]
-        for fault in settings.simulator_faults:
-            options += ["--fault", format_fault(fault)]
-        return await processes.start("sitl", "sitl", settings.mission, *options, *self._common_options())
+    async def _start_programs(self) -> None:
+        """Start simulator and companions, as far as the settings ask for them."""
+        programs, mission = self.programs, self.flight.mission
+        if self._simulated:
+            processes, child = await programs.start_simulator(mission)
+            programs.watches.append(self._group.create_task(processes.watch(child), name="watch the simulator"))
+        await self._settle_origin()
+        if self.settings.starts_companions_in(self.flight.mode):
+            processes, children = await programs.start_companions(self.flight.mission, self.flight.mode)
+            for child in children:
+                programs.watches.append(self._group.create_task(self._watch_companion(processes, child)))
 
-    async def _start_companions(self, processes: Processes) -> list[Child]:
-        children: list[Child] = []
-        self.events.add("process", f"starting {len(self.flight.mission.vehicles)} companions")
-        for vehicle in self.flight.mission.vehicles:
-            name = f"companion-{vehicle.sysid}"
-            options = ["--vehicle", str(vehicle.sysid), "--mission", self.settings.mission]
-            options += ["--mode", self.settings.mode.value, "--seed", str(self.settings.seed)]
-            options += ["--log", str(self.work_dir / f"{name}.jsonl")]
-            for fault in self.settings.faults:
-                if fault.vehicle == vehicle.sysid:
-                    options += ["--fault", format_fault(fault)]
-            children.append(await processes.start(name, "companion", *options, *self._common_options()))
-        return children
-
-    def _common_options(self) -> list[str]:
-        origin = self.flight.mission.origin
-        place = f"{origin.latitude_deg!r},{origin.longitude_deg!r},{origin.altitude_amsl_m!r}"
-        settings = self.settings
-        ports = ["--speed", f"{settings.speed:g}", "--instance-base", str(settings.instance_base)]
-        return [*ports, "--origin", place, "--supervised"]
+    async def _end_programs(self) -> None:
+        await self.programs.end()
 
     async def _settle_origin(self) -> None:
         """With `--origin here`, move the mission to where its first vehicle stands."""
@@ -227,24 +272,40 @@ class FlightApp:
             self.desk.collect_texts()
             await asyncio.sleep(TRAIL_INTERVAL_S / self.settings.speed)
 
+    async def _write_reports(self) -> None:
+        """With a page, each flight's report is written when its last vehicle is down."""
+        while True:
+            await asyncio.sleep(REPORT_INTERVAL_S)
+            if self.flight.finished and self.report is None:
+                self.report = self._write_report("")
+                self.events.add("ended", f"{'success' if self.report.success else 'failed'}: {self.report.reason}")
+
     def _write_report(self, reason: str) -> FlightReport:
         """Write `report.json` and `flight.png`."""
-        flown = self._flown()
+        flown, folder = self._flown(), self.programs.log_dir
         ends_s = [float(part.times_s[-1]) for part in flown.values() if len(part.times_s)]
         wall_s = time.monotonic() - self._started_s
         report = make_report(self.flight, flown, reason=reason, wall_s=wall_s, sim_s=max(ends_s, default=0.0))
-        (self.work_dir / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
+        (folder / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
         names = {vehicle.sysid: vehicle.name for vehicle in self.flight.mission.vehicles}
         tracks = {names[sysid]: part.in_flight().positions_m for sysid, part in flown.items() if sysid in names}
-        draw_flight(self.work_dir / "flight.png", self.flight.mission, self.flight.plan, tracks)
+        draw_flight(folder / "flight.png", self.flight.mission, self.flight.plan, tracks)
         return report
 
     def _flown(self) -> dict[int, Flown]:
-        truth = self.work_dir / TRUTH_FILE
-        if self.settings.autopilots is Autopilots.SIMULATED and truth.exists():
+        truth = self.programs.truth_path
+        if self._simulated and truth.exists():
             return read_truth(truth)
         assert self.desk.trails is not None
         return {sysid: flown_from_trail(trail) for sysid, trail in self.desk.trails.by_sysid.items()}
+
+
+async def _is_set(event: asyncio.Event, timeout_s: float) -> bool:
+    """Wait for an event, but not longer than this; whether it came."""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(timeout_s):
+            await event.wait()
+    return event.is_set()
 
 
 def _first(group: BaseExceptionGroup) -> BaseException:

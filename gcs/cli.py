@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from gcs.planner_process import PlannerProcess
 
 BAD_INPUT = 2
+LEAST_TOKEN_LENGTH = 8
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -42,6 +43,12 @@ LinkOption = Annotated[
     list[str] | None, typer.Option("--link", metavar="URL", help="udpin://HOST:PORT or udpout://HOST:PORT; repeatable")
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="of planner and simulator: one seed, one plan")]
+HostOption = Annotated[str, typer.Option(help="address of the web page; beyond loopback only with --token")]
+PortOption = Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")]
+TokenOption = Annotated[
+    str | None,
+    typer.Option(envvar="GCS_TOKEN", help="whoever opens the page has to know it; better in $GCS_TOKEN than here"),
+]
 InstanceOption = Annotated[int, typer.Option("--instance-base", min=0, max=10_000, help="shifts all ports")]
 
 
@@ -59,8 +66,10 @@ def fly(
         str | None, typer.Option(metavar="LAT,LON,ALT|here", help="where on earth the mission is flown")
     ] = None,
     report: Annotated[Path | None, typer.Option(metavar="DIR", help="where report, logs and picture go")] = None,
-    host: Annotated[str, typer.Option(help="address of the web page; loopback only")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    token: TokenOption = None,
+    wait: Annotated[bool, typer.Option("--wait", help="nothing begins by itself: the page's operator does it")] = False,
     fault: Annotated[
         list[str] | None,
         typer.Option(
@@ -83,8 +92,7 @@ def fly(
     """
     if sim and companions:
         raise UsageError("--sim starts the companions already: give one of --sim and --companions")
-    if host not in {"127.0.0.1", "localhost", "::1"}:
-        raise UsageError(f"--host {host}: the page is served on loopback only")
+    _check_access(host, token)
     faults = [parse_any_fault(text) for text in fault or ()]
     for one, text in zip(faults, fault or (), strict=True):
         if not sim and isinstance(one, SimulatorFault):
@@ -102,6 +110,8 @@ def fly(
         report_dir=report,
         host=host,
         port=port,
+        token=token,
+        waits=wait,
         faults=tuple(one for one in faults if isinstance(one, Fault)),
         simulator_faults=tuple(one for one in faults if isinstance(one, SimulatorFault)),
         instance_base=instance_base,
@@ -171,7 +181,9 @@ def check(mission: MissionArgument) -> None:
 @app.command()
 def watch(
     link: LinkOption = None,
-    port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    token: TokenOption = None,
 ) -> None:
     """Show whatever is on the links in the web page, and command it from there.
 
@@ -184,11 +196,12 @@ def watch(
     from gcs.view.server import serve_page
     from gcs.watch import watch as run_watch
 
+    _check_access(host, token)
     links = tuple(parse_link_url(text) for text in link or ()) or chosen.FlightSettings(mission="").ground_links()
     console = FlightConsole()
     events = EventLog(time.monotonic, listeners=[console.show])
-    console.say(f"page: http://127.0.0.1:{port}")
-    asyncio.run(run_watch(links, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
+    console.say(f"page: {chosen.FlightSettings(mission='', host=host, port=port).page_url}")
+    asyncio.run(run_watch(links, events, lambda desk, first: serve_page(desk, host, port, first, token)))
 
 
 @app.command()
@@ -290,9 +303,10 @@ async def _fly(
     from gcs.view.server import serve_page
 
     def page(desk: "Desk", first_browser: asyncio.Event) -> Coroutine[None, None, None]:
-        return serve_page(desk, settings.host, settings.port, first_browser)
+        return serve_page(desk, settings.host, settings.port, first_browser, settings.token)
 
-    app = FlightApp(settings, mission, planner.plan, events, work_dir, None if settings.headless else page)
+    shown = None if settings.headless else page
+    app = FlightApp(settings, mission, planner.plan, events, work_dir, shown, planner)
     planner.on_progress.append(app.desk.on_plan_progress)
     return await app.run()
 
@@ -317,6 +331,14 @@ def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
     if text == "here":
         return chosen.OriginHere.HERE
     return parse_origin(text)
+
+
+def _check_access(host: str, token: str | None) -> None:
+    """A page beyond loopback can be reached by others: they have to know a token that is not guessed."""
+    if token is not None and len(token) < LEAST_TOKEN_LENGTH:
+        raise UsageError(f"--token: expected at least {LEAST_TOKEN_LENGTH} characters, found {len(token)}")
+    if token is None and host not in chosen.LOOPBACK:
+        raise UsageError(f"--host {host}: others can reach the page there: give a --token that they have to know")
 
 
 def _check_output(path: Path) -> None:

@@ -1,6 +1,7 @@
 """The cloud planner in a process of its own, so that planning never delays the links or the page."""
 
 import asyncio
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -8,8 +9,9 @@ import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import Connection
+from typing import Any
 
-from gcs.planner import plan_mission
+from gcs.planner import ALGORITHMS, plan_mission
 from gcs.planner.plan import FleetPlan, Progress
 from missions.mission import Mission
 
@@ -17,34 +19,49 @@ ProgressListener = Callable[[Progress], None]
 
 _progress: Connection
 """In the worker: where progress goes."""
+_cancelled: Any
+"""In the worker: number of the latest plan that nobody wants any more, shared with the parent."""
+
+CANCEL_TIMEOUT_S = 1.0
 
 
 class PlannerProcess:
     """One worker process that plans when asked to; leaving the `with` block ends it, also in mid-plan.
 
     Args:
-        algorithm: the planner's name.
+        algorithm: the planner's name; it may be changed between two plans.
         seed: of its random numbers.
         on_progress: called on the event loop while it plans; more may be added.
     """
 
     def __init__(self, algorithm: str, seed: int, on_progress: Iterable[ProgressListener] = ()) -> None:
-        self._algorithm, self._seed, self.on_progress = algorithm, seed, list(on_progress)
+        self.algorithm, self._seed, self.on_progress = algorithm, seed, list(on_progress)
+        self.algorithms = ALGORITHMS
         context = multiprocessing.get_context("spawn")
         self._receiver, self._sender = context.Pipe(duplex=False)
-        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(self._sender,))
+        self._plans = 0
+        self._cancelled = context.RawValue(ctypes.c_long, 0)
+        work = (self._sender, self._cancelled)
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=work)
 
     async def plan(self, mission: Mission) -> FleetPlan:
-        """Plan for the whole fleet.
+        """Plan for the whole fleet; when it is cancelled, the search is ended first.
 
         Raises:
             MissionError: the mission cannot be planned for.
         """
         loop = asyncio.get_running_loop()
         loop.add_reader(self._receiver.fileno(), self._drain)
+        self._plans += 1
+        search = loop.run_in_executor(self._pool, _plan, mission, self.algorithm, self._seed, self._plans)
         try:
-            return await loop.run_in_executor(self._pool, _plan, mission, self._algorithm, self._seed)
+            return await asyncio.shield(search)
+        except asyncio.CancelledError:
+            self._cancelled.value = self._plans
+            await asyncio.wait({search}, timeout=CANCEL_TIMEOUT_S)
+            raise
         finally:
+            self._drain()
             loop.remove_reader(self._receiver.fileno())
 
     def _drain(self) -> None:
@@ -64,10 +81,10 @@ class PlannerProcess:
         self._sender.close()
 
 
-def _begin(progress: Connection) -> None:
+def _begin(progress: Connection, cancelled: Any) -> None:
     """Set up the worker: Ctrl-C is its parent's business, and it does not outlive its parent."""
-    global _progress
-    _progress = progress
+    global _progress, _cancelled
+    _progress, _cancelled = progress, cancelled
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
 
@@ -84,5 +101,11 @@ def _exit_after_parent() -> None:
     os._exit(1)
 
 
-def _plan(mission: Mission, algorithm: str, seed: int) -> FleetPlan:
-    return plan_mission(mission, algorithm=algorithm, seed=seed, on_progress=_progress.send)
+def _plan(mission: Mission, algorithm: str, seed: int, number: int) -> FleetPlan:
+    return plan_mission(
+        mission,
+        algorithm=algorithm,
+        seed=seed,
+        on_progress=_progress.send,
+        should_stop=lambda: _cancelled.value >= number,
+    )

@@ -9,6 +9,9 @@ from gcs.link.url import LinkUrl, Scheme
 from missions.faults import Fault, SimulatorFault
 from missions.frames import GeodeticPoint
 
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+"""Names of this machine that nobody else can reach."""
+
 
 class PlanningMode(Enum):
     """Who plans the flight; comparing the three is the paper's claim."""
@@ -61,10 +64,19 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     simulator_faults: tuple[SimulatorFault, ...] = ()
     """Beside those of the mission."""
     instance_base: int = 0
+    waits: bool = False
+    """With a page, nothing begins by itself."""
+    token: str | None = None
+    """Whoever opens the page has to know it."""
 
     @property
-    def starts_companions(self) -> bool:
-        return self.mode.needs_companions and self.autopilots is not Autopilots.ATTACHED
+    def page_url(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}"
+
+    def starts_companions_in(self, mode: PlanningMode) -> bool:
+        """Whether this program starts companions for a flight in this mode."""
+        return mode.needs_companions and self.autopilots is not Autopilots.ATTACHED
 
     def ground_links(self) -> tuple[LinkUrl, ...]:
         """The links that were asked for, or the usual port on loopback."""

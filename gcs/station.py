@@ -130,6 +130,12 @@ class Station:
         if not await self.holds_within(condition, timeout_s):
             raise LinkLost(f"{otherwise} (waited {timeout_s:g} s)")
 
+    def forget(self) -> None:
+        """Know no vehicle any more: others will come in their place."""
+        self.fleet.vehicles.clear()
+        self.codec.sources.clear()
+        self._routes.clear()
+
     def vehicle(self, sysid: int) -> VehicleState:
         """The state of a vehicle that has been heard.
 

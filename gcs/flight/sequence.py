@@ -54,6 +54,9 @@ class FleetFlight:
     speed: float = 1.0
     unattended: bool = True
     plan: FleetPlan | None = None
+    """What is flown."""
+    candidates: dict[str, FleetPlan] = field(default_factory=dict)
+    """What each algorithm has made of this mission last."""
     vehicles: dict[int, VehicleFlight] = field(default_factory=dict)
 
     @property
@@ -100,19 +103,41 @@ class FleetFlight:
         """Hear every vehicle, and its companion where one is needed."""
         await _for_all(self._preparation.connect, self.mission.vehicles)
 
+    async def connect_one(self, part: VehicleFlight) -> None:
+        """Hear one vehicle, and its companion where one is needed."""
+        await self._preparation.connect(part.vehicle)
+
     async def make_plan(self) -> None:
         """Let the cloud planner plan for the whole fleet.
 
         Raises:
             PreflightError: there is no feasible plan; says what keeps it from being one.
         """
-        self.events.add("plan", f"planning {self.mission.name} for {len(self.mission.vehicles)} vehicles")
-        plan = await self.planner(self.mission)
+        plan = await self.try_plan()
         if not plan.feasible:
             raise PreflightError("no feasible plan: " + "; ".join(str(violation) for violation in plan.violations))
         self.take_plan(plan)
-        text = f"plan found in {plan.wall_s:.2f} s, objective {plan.objective:.1f}"
+
+    async def try_plan(self) -> FleetPlan:
+        """Let the planner plan, and keep what came of it among the candidates, feasible or not."""
+        self.events.add("plan", f"planning {self.mission.name} for {len(self.mission.vehicles)} vehicles")
+        plan = await self.planner(self.mission)
+        self.candidates[plan.algorithm] = plan
+        verdict = "plan found" if plan.feasible else f"no feasible plan by {plan.algorithm}"
+        text = f"{verdict} in {plan.wall_s:.2f} s, objective {plan.objective:.1f}"
         self.events.add("planned", text, objective=plan.objective, evaluations=plan.evaluations)
+        return plan
+
+    def take_best_plan(self) -> None:
+        """Fly the candidate with the least objective among those that are feasible.
+
+        Raises:
+            PreflightError: there is none.
+        """
+        feasible = [plan for plan in self.candidates.values() if plan.feasible]
+        if not feasible:
+            raise PreflightError("no algorithm has found a feasible plan")
+        self.take_plan(min(feasible, key=lambda plan: plan.objective))
 
     def take_plan(self, plan: FleetPlan) -> None:
         """Fly this plan; nothing of it is stored on a vehicle yet."""

@@ -14,7 +14,22 @@ from gcs.view.colours import Rgb, Tone, css
 from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
 from gcs.view.words import NOTHING
 
-HEADINGS = ("Vehicle", "Mode", "Phase", "Battery", "Height", "Speed", "To target", "Companion", "Replan", "Link")
+HEADINGS = (
+    "Vehicle",
+    "Mode",
+    "Phase",
+    "Battery",
+    "Height",
+    "Speed",
+    "Clear",
+    "To target",
+    "Way",
+    "ETA",
+    "Companion",
+    "Replan",
+    "Heard",
+    "Link",
+)
 
 FEW = 6
 """Vehicles up to which there is room for air between the rows."""
@@ -33,10 +48,14 @@ class Row:
     battery_percent: float = math.nan
     height_m: float = math.nan
     speed_m_s: float = math.nan
+    clearance_m: float = math.nan
     to_target_m: float = math.nan
+    progress: float = math.nan
+    eta_s: float = math.nan
     companion: tuple[str, Tone] = (NOTHING, Tone.QUIET)
     replan_ms: float = math.nan
-    link: tuple[str, Tone] = (NOTHING, Tone.QUIET)
+    heard: tuple[str, Tone] = (NOTHING, Tone.QUIET)
+    quality: float = math.nan
 
 
 def rows(desk: Desk, seen: Iterable[Sighting], selected: set[int], now_s: float) -> list[Row]:
@@ -63,6 +82,8 @@ def _row(
     part = desk.flight.vehicles.get(sysid) if desk.flight is not None else None
     monitor = part.monitor if part is not None else None
     sighting, status = places.get(sysid), state.companion.status
+    outlook = desk.observations.outlooks.get(sysid)
+    under_way = outlook is not None and monitor is not None and monitor.phase.in_flight
     return Row(
         name,
         colour,
@@ -73,10 +94,14 @@ def _row(
         battery_percent=state.battery_percent,
         height_m=float(sighting.position_m[2]) if sighting else math.nan,
         speed_m_s=float(np.linalg.norm(state.velocity_enu_m_s)) if sighting else math.nan,
+        clearance_m=outlook.clearance_m if outlook is not None and state.airborne else math.nan,
         to_target_m=_distance_m(sighting, monitor),
+        progress=outlook.progress if under_way and outlook is not None else math.nan,
+        eta_s=outlook.eta_s if under_way and outlook is not None else math.nan,
         companion=words.companion_words(state, now_s),
         replan_ms=status.replan_p50_ms if status is not None and status.replans else math.nan,
-        link=words.age_words(now_s - state.telemetry_s),
+        heard=words.age_words(now_s - state.telemetry_s),
+        quality=outlook.link_quality if outlook is not None else math.nan,
     )
 
 
@@ -94,10 +119,14 @@ def _render_row(row: Row) -> str:
         _battery(row.battery_percent),
         _number(row.height_m, "m"),
         _number(row.speed_m_s, "m/s"),
+        _number(row.clearance_m, "m"),
         _number(row.to_target_m, "m"),
+        _progress(row.progress),
+        f"<td>{words.duration_words(row.eta_s)}</td>",
         _words(row.companion),
         _number(row.replan_ms, "ms"),
-        _words(row.link),
+        _words(row.heard),
+        _words(words.quality_words(row.quality)),
     )
     selected = ' class="selected"' if row.selected else ""
     return f"<tr{selected}>{''.join(cells)}</tr>"
@@ -114,6 +143,12 @@ def _battery(percent: float) -> str:
         return f"<td>{NOTHING}</td>"
     tone = words.battery_tone(percent).value
     return f'<td><em class="{tone}"><q style="width:{percent:.0f}%"></q></em>{percent:.0f} %</td>'
+
+
+def _progress(share: float) -> str:
+    if math.isnan(share):
+        return f"<td>{NOTHING}</td>"
+    return f'<td><em class="info"><q style="width:{100 * share:.0f}%"></q></em>{100 * share:.0f} %</td>'
 
 
 def _number(value: float, unit: str) -> str:

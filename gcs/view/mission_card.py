@@ -39,19 +39,27 @@ def planning(desk: Desk) -> bool:
     """Whether the cloud planner is at work now."""
     if desk.flight is None or not desk.plan_progress:
         return False
-    if desk.running is Intent.PLAN:
+    if desk.running in {Intent.PLAN, Intent.COMPARE}:
         return True
     return desk.running is Intent.FLY and desk.flight.plan is None
 
 
-def render_head(desk: Desk) -> str:
-    """Name and description of the mission, and where the flight is."""
+def render_head(desk: Desk, now_s: float) -> str:
+    """Name and description of the mission, where the flight is, and when it begins by itself."""
     mission, (phase, tone) = desk.mission, flight_phase(desk)
     name, about = (mission.name, _about(mission)) if mission is not None else ("No mission", "Whatever is on the links")
     return (
         f'<div class="gcs-head"><h1>{escape(name)}</h1><p>{escape(about)}</p>'
-        f'<div class="phase {tone.value}"><s></s>{escape(phase)}</div><small>{escape(_manner(desk))}</small></div>'
+        f'<div class="phase {tone.value}"><s></s>{escape(phase)}</div><small>{escape(_manner(desk))}</small>'
+        f"{_countdown(desk, now_s)}</div>"
     )
+
+
+def _countdown(desk: Desk, now_s: float) -> str:
+    if desk.begins_s is None:
+        return ""
+    left_s = max(0, round(desk.begins_s - now_s))
+    return f'<p class="countdown">The flight begins by itself in {left_s} s. Wait, or any order, keeps it.</p>'
 
 
 def render_plan(plan: FleetPlan | None, progress: Sequence[Progress]) -> str:
@@ -101,6 +109,8 @@ def chart(values: Sequence[float]) -> str:
 
 def _on_the_ground(desk: Desk) -> tuple[str, Tone]:
     assert desk.flight is not None
+    if desk.running in {Intent.LOAD, Intent.MODE}:
+        return "Loading", Tone.INFO
     if desk.flight.prepared:
         return "Ready to fly", Tone.INFO
     if desk.running is Intent.UPLOAD or (desk.running is Intent.FLY and desk.flight.plan is not None):

@@ -8,17 +8,20 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from gcs.desk import Desk, Intent
+from gcs.desk import Desk
 from gcs.view import words
+from gcs.view.aiming import Aiming
 from gcs.view.cameras import Cameras
 from gcs.view.colours import BRAND, GRID, GRID_MAIN, TARGET, vivid
 from gcs.view.motion_scene import MotionScene
 from gcs.view.panels import Panels, Press
 from gcs.view.plan_scene import PlanScene
+from gcs.view.seating import Seating
 from gcs.view.sightings import Sighting, sightings, vehicle_colours, vehicle_order
 from gcs.view.tag_scene import Tag, TagScene
 from gcs.view.vehicle_scene import LEAST_SPAN_PX, VehicleScene
 from gcs.view.world_scene import WorldScene, diagonal_m
+from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
 
@@ -29,6 +32,8 @@ TELL_INTERVAL_S = 0.25
 WATCHED_M = np.array([[-30.0, -30.0, 0.0], [30.0, 30.0, 15.0]])
 """What is framed where there is no mission, around where the first vehicle has its home."""
 TARGET_TAG_SCALE, TARGET_PX = 0.85, 14.0
+FAR_SIZES = 12.0
+"""How many times the size of the world a click may be off."""
 VEHICLE_FLATNESS = 0.6
 """A quadrotor is less high than wide in a picture from above."""
 PLAIN: dict[str, Any] = {
@@ -57,16 +62,27 @@ class Page:
         self._seen: list[Sighting] = []
         server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, brand_color=BRAND)
         server.gui.set_panel_label(TITLE)
-        _light(server.scene)
-        size_m = self._draw_surroundings()
-        self._plan = PlanScene(server.scene, size_m * POINT_SHARE)
-        self._motion = MotionScene(server.scene, max(LEAST_TRAIL_SPACING_M, size_m * TRAIL_SPACING_SHARE))
-        self._vehicles = VehicleScene(server.scene, self._ground_height_m)
-        self._tags = TagScene(server.scene)
-        self._panels = Panels(server, desk, self._press, self._views())
+        self._draw_scene()
+        self._panels = Panels(server, desk, lambda client: self._aiming.begin(client), self._views())
+        self._aiming = Aiming(
+            server,
+            desk,
+            self._panels.presses,
+            lambda: self._panels.selected,
+            lambda places_m: self._ground_height_m(places_m),
+            lambda: FAR_SIZES * self._size_m,
+            lambda: self._panels.go_to_height_m,
+        )
+        self._seating = Seating(server, desk.seat)
 
     def update(self, now_s: float) -> None:
         """Bring the page up to date."""
+        if self._desk.mission is not self._mission and self._is_another(self._desk.mission):
+            self._server.scene.reset()
+            self._draw_scene()
+            for client in self._server.get_clients().values():
+                client.camera.far = self._server.initial_camera.far
+                self._cameras.overview(client)
         self._seen = sightings(self._desk)
         lens = self._cameras.lens()
         with self._server.atomic():
@@ -75,7 +91,8 @@ class Page:
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + TELL_INTERVAL_S
-                self._desk.collect_texts()
+                self._desk.observe(now_s)
+                self._seating.update()
                 self._show_plan()
                 self._tags.show([*self._vehicle_tags(now_s), *self._target_tags], lens)
                 self._panels.update(self._seen, now_s)
@@ -95,6 +112,24 @@ class Page:
             )
             for sighting in self._seen
         ]
+
+    def _is_another(self, mission: Mission | None) -> bool:
+        """Whether a mission is drawn elsewise than the one that is shown; a moved origin changes nothing."""
+        shown, self._mission = self._mission, mission
+        if shown is None or mission is None:
+            return True
+        return mission.moved_to(shown.origin) != shown
+
+    def _draw_scene(self) -> None:
+        """Everything of the scene, from its beginning."""
+        scene = self._server.scene
+        self._mission = self._desk.mission
+        _light(scene)
+        self._size_m = self._draw_surroundings()
+        self._plan = PlanScene(scene, self._size_m * POINT_SHARE)
+        self._motion = MotionScene(scene, max(LEAST_TRAIL_SPACING_M, self._size_m * TRAIL_SPACING_SHARE))
+        self._vehicles = VehicleScene(scene, self._ground_height_m)
+        self._tags = TagScene(scene)
 
     def _draw_surroundings(self) -> float:
         """The world, or where there is no mission a plain; how large it is [m]."""
@@ -128,14 +163,10 @@ class Page:
     def _ground_height_m(self, places_m: Array) -> Array:
         return self._world.ground_height_m(places_m) if self._world is not None else np.zeros(len(places_m))
 
-    def _press(self, intent: Intent) -> None:
-        """Called in a thread of viser."""
-        self._loop.call_soon_threadsafe(lambda: self._desk.request(intent, sorted(self._panels.selected)))
-
     def _views(self) -> dict[str, tuple[viser.IconName, Press]]:
         return {
-            "Overview": (viser.Icon.CUBE, self._view(self._cameras.overview)),
-            "Top": (viser.Icon.MAP_2, self._view(self._cameras.from_above)),
+            "Overview": (viser.Icon.CUBE, self._view(lambda client: self._cameras.overview(client))),
+            "Top": (viser.Icon.MAP_2, self._view(lambda client: self._cameras.from_above(client))),
             "Follow": (viser.Icon.FOCUS_2, self._view(self._follow)),
         }
 

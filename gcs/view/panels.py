@@ -1,37 +1,34 @@
-"""The page's panels: what the operator reads and presses. Presses become intents on the event loop's thread."""
+"""The page's panels: what the operator reads and presses, and where it stands."""
 
 from collections.abc import Callable
 from importlib.resources import files
 
 import viser
 
-from gcs.desk import Desk, Intent
-from gcs.view import event_list, fleet_table, mission_card
-from gcs.view.colours import BRAND, CAUTION, QUIET, Rgb
+from gcs.desk import Desk
+from gcs.errors import UsageError
+from gcs.view import alert_list, event_list, fleet_table, mission_card, order_list, plan_table, readiness_list
+from gcs.view.choosing import choose
+from gcs.view.colours import CAUTION, QUIET
+from gcs.view.command_panel import CommandPanel
+from gcs.view.link_panel import LinkPanel
+from gcs.view.plots_panel import PlotsPanel
+from gcs.view.presses import Presses, visitor_key
 from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
 
-PANEL_PX, FLEET_PX, EDGE_PX = 330, 860, 14
+PANEL_PX, FLEET_PX, EDGE_PX = 330, 1000, 14
+SEVERAL = "Several ..."
 
 Press = Callable[[viser.GuiEvent], None]
 
-LOOKS: dict[Intent, tuple[viser.IconName, Rgb]] = {
-    Intent.PLAN: (viser.Icon.ROUTE, BRAND),
-    Intent.UPLOAD: (viser.Icon.UPLOAD, BRAND),
-    Intent.FLY: (viser.Icon.PLANE_DEPARTURE, (30, 150, 92)),
-    Intent.HOLD: (viser.Icon.PLAYER_PAUSE, CAUTION),
-    Intent.RESUME: (viser.Icon.PLAYER_PLAY, (30, 150, 92)),
-    Intent.RTL: (viser.Icon.HOME_MOVE, QUIET),
-    Intent.LAND: (viser.Icon.PLANE_ARRIVAL, QUIET),
-}
-
 
 class Panels:
-    """Buttons, selector, progress, fleet table and event log.
+    """Buttons, selector, alerts, and the tabs of fleet, links, plots, plans, events, orders and readiness.
 
     Args:
         server: of the page.
         desk: what is shown and commanded.
-        on_press: called with an intent, in a thread of viser.
+        on_go_to: called in a thread of viser when a place for the selected vehicles is to be pointed at.
         views: name and action of each camera button, called in a thread of viser.
     """
 
@@ -39,65 +36,70 @@ class Panels:
         self,
         server: viser.ViserServer,
         desk: Desk,
-        on_press: Callable[[Intent], None],
+        on_go_to: Callable[[viser.ClientHandle], None],
         views: dict[str, tuple[viser.IconName, Press]],
     ) -> None:
-        self._desk, self._on_press = desk, on_press
-        self._gui = gui = server.gui
-        self._buttons: dict[Intent, viser.GuiButtonHandle] = {}
+        self._desk, self._gui = desk, server.gui
+        self.presses = Presses(desk, lambda: self.selected)
+        self._commands = CommandPanel(server.gui, desk, self.presses, on_go_to)
         self._choices: dict[str, list[int]] = {"All (0)": []}
-        gui.main_panel.dock_left()
-        gui.main_panel.set_width(PANEL_PX)
+        server.gui.main_panel.dock_left()
+        server.gui.main_panel.set_width(PANEL_PX)
         self._style()
-        self._head = gui.add_html("")
-        if desk.flight is not None:
-            self._add_flight()
-        self._add_vehicles()
+        self._add_head()
+        self._add_commands()
         self._add_views(views)
-        self._events = self._add_events()
-        self._fleet = self._add_fleet()
+        self._add_log()
+        self._add_fleet()
 
     @property
     def selected(self) -> set[int]:
         """System ids of the vehicles that the operator's orders concern."""
+        if self._selector.value == SEVERAL:
+            return self._several()
         return set(self._choices.get(self._selector.value, []))
 
     @property
     def picked_out(self) -> set[int]:
-        """The selected vehicle, if it is one and not all."""
+        """The selected vehicles, if they are not all."""
         return set() if self._selector.value == next(iter(self._choices)) else self.selected
+
+    @property
+    def go_to_height_m(self) -> float:
+        """Above the ground of the place that vehicles are sent to."""
+        return self._commands.height_m.value
 
     def update(self, seen: list[Sighting], now_s: float) -> None:
         """Bring everything up to date; viser sends only what has changed."""
         desk = self._desk
         self._offer_vehicles()
-        self._head.content = mission_card.render_head(desk)
-        refused = [(intent.value, why) for intent in self._buttons if (why := self._allow(intent)) is not None]
-        self._reasons.content = mission_card.render_reasons(refused)
-        if desk.flight is not None:
-            self._show_plan(desk)
+        self._head.content = mission_card.render_head(desk, now_s)
+        self._alerts.content = alert_list.render(desk.observations.alerts)
+        self._take_command.visible = len(desk.seat.present) > 1 or desk.seat.holder is None
+        self._reasons.content = mission_card.render_reasons(self._commands.update(sorted(self.selected)))
         self._fleet.content = fleet_table.render(fleet_table.rows(desk, seen, self.picked_out, now_s))
+        self._links.update(now_s)
+        self._plots.update(sorted(self.picked_out), now_s)
         names = vehicle_names(desk)
         by_name = {names[sysid]: colour for sysid, colour in vehicle_colours(names).items()}
         self._events.content = event_list.render(desk.events.events, by_name)
+        self._orders.content = order_list.render(desk.orders.orders)
+        self._readiness.content = readiness_list.render(desk, now_s)
+        if desk.flight is not None:
+            self._plans.content = plan_table.render(desk.flight.candidates, desk.flight.plan)
 
-    def _allow(self, intent: Intent) -> str | None:
-        why = self._desk.why_not(intent, sorted(self.selected))
-        self._buttons[intent].disabled = why is not None
-        return why
-
-    def _show_plan(self, desk: Desk) -> None:
-        assert desk.flight is not None
-        planning = mission_card.planning(desk)
-        self._progress.visible = planning
-        if planning:
-            self._progress.value = round(100.0 * min(desk.plan_progress[-1].share_done, 1.0))
-        plan = None if planning else desk.flight.plan
-        self._plan.content = mission_card.render_plan(plan, desk.plan_progress)
+    def _several(self) -> set[int]:
+        try:
+            return set(choose(self._names.value, vehicle_names(self._desk)))
+        except UsageError:
+            return set()
 
     def _offer_vehicles(self) -> None:
         names = vehicle_names(self._desk)
         choices = {f"All ({len(names)})": list(names)} | {name: [sysid] for sysid, name in names.items()}
+        if len(names) > 2:
+            choices[SEVERAL] = []
+        self._names.visible = self._selector.value == SEVERAL
         if choices == self._choices:
             return
         all_before = self._selector.value == next(iter(self._choices))
@@ -106,55 +108,64 @@ class Panels:
         if all_before:
             self._selector.value = next(iter(choices))
 
-    def _add_flight(self) -> None:
-        with self._gui.add_folder("Mission"):
-            self._columns(3)
-            for intent in (Intent.PLAN, Intent.UPLOAD, Intent.FLY):
-                self._add_button(intent)
-            self._plan = self._gui.add_html("")
-            self._progress = self._gui.add_progress_bar(0.0, animated=True, visible=False, color=BRAND)
+    def _add_head(self) -> None:
+        self._head = self._gui.add_html("")
+        self._alerts = self._gui.add_html("")
+        self._take_command = self._gui.add_button(
+            "Take command", icon=viser.Icon.STEERING_WHEEL, color=CAUTION, visible=False
+        )
 
-    def _add_vehicles(self) -> None:
+        def take(event: viser.GuiEvent) -> None:
+            client = event.client
+            if client is not None:
+                self.presses.do(lambda: self._desk.seat.take(visitor_key(client)))
+
+        self._take_command.on_click(take)
+
+    def _add_commands(self) -> None:
+        if self._desk.flight is not None:
+            with self._gui.add_folder("Mission"):
+                self._commands.add_flight()
         with self._gui.add_folder("Vehicles"):
-            self._columns(2)
+            self._gui.add_html('<span class="gcs-columns-3"></span><span class="gcs-command"></span>')
             self._selector = self._gui.add_dropdown("Orders to", tuple(self._choices))
-            for intent in (Intent.HOLD, Intent.RESUME, Intent.RTL, Intent.LAND):
-                if intent is not Intent.RESUME or self._desk.flight is not None:
-                    self._add_button(intent)
+            self._names = self._gui.add_text(
+                "Vehicles", "", visible=False, hint="names, system ids, ranges: alpha, 3, 5-9"
+            )
+            self._commands.add_vehicles()
         self._reasons = self._gui.add_html("")
 
     def _add_views(self, views: dict[str, tuple[viser.IconName, Press]]) -> None:
         with self._gui.add_folder("View"):
-            self._columns(3)
+            self._gui.add_html('<span class="gcs-columns-3"></span>')
             for name, (icon, act) in views.items():
                 self._gui.add_button(name, icon=icon, color=QUIET).on_click(act)
 
-    def _add_events(self) -> viser.GuiHtmlHandle:
+    def _add_log(self) -> None:
         panel = self._gui.add_panel()
         with panel.add_tab("Events", viser.Icon.LIST):
             self._style()
-            events = self._gui.add_html("")
+            self._events = self._gui.add_html("")
+        with panel.add_tab("Orders", viser.Icon.CHECKLIST):
+            self._orders = self._gui.add_html("")
+        with panel.add_tab("Ready", viser.Icon.CLIPBOARD_CHECK):
+            self._readiness = self._gui.add_html("")
         panel.dock_below(self._gui.main_panel)
-        return events
 
-    def _add_fleet(self) -> viser.GuiHtmlHandle:
+    def _add_fleet(self) -> None:
         panel = self._gui.add_panel()
         with panel.add_tab("Fleet", viser.Icon.DRONE):
             self._style()
-            table = self._gui.add_html("")
+            self._fleet = self._gui.add_html("")
+        with panel.add_tab("Links", viser.Icon.ANTENNA_BARS_5):
+            self._links = LinkPanel(self._gui, self._desk, self.presses)
+        plots = panel.add_tab("Plots", viser.Icon.CHART_LINE)
+        self._plots = PlotsPanel(self._gui, plots, self._desk)
+        if self._desk.flight is not None:
+            with panel.add_tab("Plans", viser.Icon.ROUTE):
+                self._plans = self._gui.add_html("")
         panel.float(x=EDGE_PX, y=-EDGE_PX, width=FLEET_PX)
-        return table
-
-    def _add_button(self, intent: Intent) -> None:
-        icon, colour = LOOKS[intent]
-        button = self._gui.add_button(intent.value, icon=icon, color=colour, disabled=True)
-        button.on_click(lambda _: self._on_press(intent))
-        self._buttons[intent] = button
 
     def _style(self) -> None:
         """The style sheet: it has to be in every panel, since a minimised panel's content is not on the page."""
         self._gui.add_html(f"<style>{files('gcs.view').joinpath('page.css').read_text()}</style>")
-
-    def _columns(self, count: int) -> None:
-        """Mark the container that is being filled: the style sheet lays its buttons out in columns."""
-        self._gui.add_html(f'<span class="gcs-columns-{count}"></span>')

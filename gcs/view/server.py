@@ -2,63 +2,86 @@
 
 import asyncio
 import contextlib
+import hmac
 import logging
 import socket
 from collections.abc import Iterator
+from contextlib import AsyncExitStack
 from urllib.parse import urlsplit
 
 import rich
 import viser
+from viser.infra import ClientId, WebsockClientConnection, WebsockServer
 
 from gcs.desk import Desk
 from gcs.errors import UsageError
 from gcs.flight.events import Severity
+from gcs.settings import LOOPBACK
+from gcs.view.gateway import SECRET_HEADER, new_secret, open_gateway
 from gcs.view.page import Page
 
 UPDATE_INTERVAL_S = 0.1
 POLICY_VIOLATION = 1008
 
-LOOPBACK = {"127.0.0.1", "localhost", "::1"}
-
 log = logging.getLogger(__name__)
 logging.getLogger("websockets").addHandler(logging.NullHandler())  # a broken connection is nothing for a terminal
 
 
-async def serve_page(desk: Desk, host: str, port: int, first_client: asyncio.Event | None = None) -> None:
+async def serve_page(
+    desk: Desk, host: str, port: int, first_client: asyncio.Event | None = None, token: str | None = None
+) -> None:
     """Serve a desk's page until cancelled.
 
     Args:
         desk: what is shown and commanded.
-        host: a loopback address.
+        host: a loopback address, or with a token any.
         port: where the page is found; no other one is taken instead.
         first_client: set once the first browser shows the page.
+        token: what visitors have to know; a gateway then stands in front of the page.
 
     Raises:
         UsageError: the port is in use.
     """
     loop = asyncio.get_running_loop()
-    server = open_server(host, port)
-    try:
+    secret = None if token is None else new_secret()
+    async with AsyncExitStack() as stack:
+        if token is None:
+            server = open_server(host, port)
+        else:
+            _check_free(host, port)
+            server = open_server("127.0.0.1", 0, secret)
+        stack.push_async_callback(asyncio.to_thread, close_server, server)
+        if token is not None and secret is not None:
+            await stack.enter_async_context(open_gateway(host, port, token, server.get_port(), secret))
         if first_client is not None:
             _tell_of_first_client(server, loop, first_client)
         await _keep_up_to_date(Page(server, desk), desk)
-    finally:
-        await asyncio.to_thread(close_server, server)
 
 
-def open_server(host: str, port: int) -> viser.ViserServer:
-    """A viser server on this port.
+def open_server(host: str, port: int, secret: str | None = None) -> viser.ViserServer:
+    """A viser server on this port; 0 is any that is free.
+
+    Args:
+        host: a loopback address.
+        port: the port.
+        secret: websockets that do not show it are refused; without one, those of other sites' pages.
 
     Raises:
         UsageError: the port is in use.
     """
-    _check_free(host, port)
+    if port:
+        _check_free(host, port)
     with _no_announcements():
         server = viser.ViserServer(host=host, port=port, verbose=False)
-        server._websock_server.on_client_connect(lambda client: _refuse_foreign_page(server, client.client_id))
-        for client_id in list(server._websock_server._live_connections):
-            _refuse_foreign_page(server, client_id)
-    if server.get_port() != port:  # somebody was faster; viser then takes the next port that is free
+        sockets = server._websock_server
+
+        async def examine(client: WebsockClientConnection) -> None:
+            await _refuse_strangers(sockets, client.client_id, secret)
+
+        sockets.on_client_connect(examine)
+        for client_id in list(sockets._live_connections):
+            asyncio.run_coroutine_threadsafe(_refuse_strangers(sockets, client_id, secret), server.get_event_loop())
+    if port and server.get_port() != port:  # somebody was faster; viser then takes the next port that is free
         close_server(server)
         raise _in_use(host, port)
     return server
@@ -95,16 +118,18 @@ def is_own_page(origin: str | None) -> bool:
     return origin is None or urlsplit(origin).hostname in LOOPBACK
 
 
-def _refuse_foreign_page(server: viser.ViserServer, client_id: int) -> None:
-    """Close a foreign page's connection: browsers let any site connect to loopback, and what it presses flies."""
-    connection = server._websock_server._live_connections.get(client_id)
+async def _refuse_strangers(sockets: WebsockServer, client_id: int, secret: str | None) -> None:
+    """Close a stranger's connection before anything is sent: browsers let any site connect to loopback."""
+    connection = sockets._live_connections.get(ClientId(client_id))
     if connection is None or connection.request is None:
         return
-    origin = connection.request.headers.get("Origin")
-    if not is_own_page(origin):
-        log.warning("refused a connection from a page of %s", origin)
-        closing = connection.close(POLICY_VIOLATION, "foreign origin")
-        asyncio.run_coroutine_threadsafe(closing, server.get_event_loop())
+    headers = connection.request.headers
+    if secret is not None and not hmac.compare_digest(headers.get(SECRET_HEADER, ""), secret):
+        log.warning("refused a connection that did not come through the gateway")
+        await connection.close(POLICY_VIOLATION, "not through the gateway")
+    elif secret is None and not is_own_page(headers.get("Origin")):
+        log.warning("refused a connection from a page of %s", headers.get("Origin"))
+        await connection.close(POLICY_VIOLATION, "foreign origin")
 
 
 def _check_free(host: str, port: int) -> None:

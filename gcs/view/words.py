@@ -87,3 +87,19 @@ def age_words(age_s: float) -> tuple[str, Tone]:
     if age_s < 1.0:
         return "live", Tone.GOOD
     return f"{age_s:.0f} s", Tone.WARN if age_s < 3.0 else Tone.BAD
+
+
+def quality_words(quality: float) -> tuple[str, Tone]:
+    """Share of a vehicle's messages that arrive, in steps of 5 %."""
+    if math.isnan(quality):
+        return NOTHING, Tone.QUIET
+    tone = Tone.BAD if quality < 0.5 else Tone.WARN if quality < 0.8 else Tone.GOOD
+    return f"{5 * round(20 * quality)} %", tone
+
+
+def duration_words(seconds: float) -> str:
+    """Minutes and seconds."""
+    if not math.isfinite(seconds):
+        return NOTHING
+    minutes, rest = divmod(round(max(seconds, 0.0)), 60)
+    return f"{minutes}:{rest:02d}"

@@ -100,13 +100,14 @@ async def test_a_row_tells_mode_phase_numbers_and_companion():
     state.companion.status = CompanionStatus(state=CompanionState.FLYING, replans=3, replan_p50_ms=1.44)
     assert desk.flight is not None
     desk.flight.vehicles[1].monitor.start(state, now_s)
+    desk.observe(now_s)
     row = (await table_of(desk, frozenset({1})))[0]
     assert (row.mode, row.phase) == (("Offboard", Tone.GOOD), ("flying", Tone.GOOD))
     assert (row.battery_percent, row.speed_m_s, row.replan_ms) == (71.0, 5.0, 1.44)
     assert row.to_target_m == pytest.approx(math.dist((1.0, 6.5, 0.0), (19.0, 8.5, 1.5)), abs=1e-2)
     assert row.companion == ("flying", Tone.GOOD)
     text = Outline(fleet_table.render([row])).text
-    assert "alpha Offboard flying 71 % 0.0 m 5.0 m/s 18.2 m flying 1.4 ms live" in text
+    assert "alpha Offboard flying 71 % 0.0 m 5.0 m/s – 18.2 m 0 % 0:06 flying 1.4 ms live –" in text
     assert 'tr class="selected"' in fleet_table.render([row])
 
 
@@ -173,12 +174,12 @@ def test_a_live_link_stands_still_and_an_old_one_warns():
 
 async def test_the_head_names_mission_and_phase():
     desk = await make_desk(planned=False)
-    assert Outline(mission_card.render_head(desk)).text == (
+    assert Outline(mission_card.render_head(desk, 0.0)).text == (
         "indoor The paper's indoor flight, two drones to crossed targets around a crate and a column"
         " Ready to plan end-cloud"
     )
     desk = await make_desk(None)
-    assert "Watching" in Outline(mission_card.render_head(desk)).words
+    assert "Watching" in Outline(mission_card.render_head(desk, 0.0)).words
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,127 @@
+"""What is watched over time: how far each vehicle has come, how well it is heard, and what an operator must know of."""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.desk.alerts import AlertBoard, alarms_of
+from gcs.desk.histories import Histories
+from gcs.dialect import AUTOPILOT
+from gcs.flight.vehicle_flight import VehicleFlight
+from gcs.link.codec import SourceCount
+from missions import obstacles
+
+if TYPE_CHECKING:
+    from gcs.desk.desk import Desk
+
+Array = npt.NDArray[np.float64]
+
+INTERVAL_S = 0.5
+QUALITY_WINDOW = 10
+"""Observations over which losses are counted: the last five seconds."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """One vehicle as of the last observation; NaN where nobody knows.
+
+    Args:
+        position_m: (3,) ENU.
+        speed_m_s: over all three axes.
+        clearance_m: to the nearest thing that is on the map.
+        link_quality: share of its messages that arrived, 0 to 1.
+        progress: share of its planned curve that lies behind it.
+        to_go_m: along the rest of that curve.
+        eta_s: how long that takes as planned, in vehicle time.
+    """
+
+    position_m: Array
+    speed_m_s: float
+    clearance_m: float = math.nan
+    link_quality: float = math.nan
+    progress: float = math.nan
+    to_go_m: float = math.nan
+    eta_s: float = math.nan
+
+
+@dataclass
+class Observations:
+    """Everything that is derived from the fleet's state twice a second.
+
+    Args:
+        histories: of each vehicle, for plots.
+        alerts: what is wrong now.
+        outlooks: by system id.
+    """
+
+    histories: Histories = field(default_factory=Histories)
+    alerts: AlertBoard = field(default_factory=AlertBoard)
+    outlooks: dict[int, Outlook] = field(default_factory=dict)
+    _counts: dict[int, deque[tuple[int, int]]] = field(default_factory=dict)
+    _next_s: float = -math.inf
+    _solid: tuple[int, obstacles.Obstacles] | None = None
+
+    def observe(self, desk: "Desk", now_s: float) -> None:
+        """Look at everything, if it is time to."""
+        if now_s < self._next_s:
+            return
+        self._next_s = now_s + INTERVAL_S
+        self.outlooks = self._look(desk)
+        self.histories.record(now_s, self.outlooks)
+        self.alerts.update(alarms_of(desk, self.outlooks, now_s), now_s)
+        for change in self.alerts.changes:
+            desk.events.add("alert", change.text, change.vehicle, change.severity)
+
+    def _look(self, desk: "Desk") -> dict[int, Outlook]:
+        placed = [(sysid, place_m) for sysid in desk.vehicles if (place_m := desk.position_m(sysid)) is not None]
+        if not placed:
+            return {}
+        clear_m = self._clearances_m(desk, np.array([place_m for _, place_m in placed]))
+        return {
+            sysid: self._outlook(desk, sysid, place_m, float(free_m))
+            for (sysid, place_m), free_m in zip(placed, clear_m, strict=True)
+        }
+
+    def _clearances_m(self, desk: "Desk", places_m: Array) -> Array:
+        mission = desk.mission
+        if mission is None:
+            return np.full(len(places_m), np.nan)
+        if self._solid is None or self._solid[0] != id(mission):
+            self._solid = (id(mission), obstacles.pack(mission.world.as_known()))
+        clear_m = obstacles.clearance(places_m, self._solid[1])
+        return np.where(clear_m >= obstacles.FAR_M, np.nan, clear_m)
+
+    def _outlook(self, desk: "Desk", sysid: int, place_m: Array, clearance_m: float) -> Outlook:
+        state, part = desk.vehicles[sysid], desk.part(sysid)
+        progress, to_go_m, eta_s = _along(part, place_m) if part is not None else (math.nan,) * 3
+        return Outlook(
+            position_m=place_m,
+            speed_m_s=float(np.linalg.norm(state.velocity_enu_m_s)),
+            clearance_m=clearance_m,
+            link_quality=self._quality(sysid, desk.station.codec.sources.get((sysid, AUTOPILOT), SourceCount())),
+            progress=progress,
+            to_go_m=to_go_m,
+            eta_s=eta_s,
+        )
+
+    def _quality(self, sysid: int, count: SourceCount) -> float:
+        seen = self._counts.setdefault(sysid, deque(maxlen=QUALITY_WINDOW + 1))
+        seen.append((count.received, count.lost))
+        received, lost = seen[-1][0] - seen[0][0], max(seen[-1][1] - seen[0][1], 0)
+        if len(seen) < 3:
+            return math.nan
+        return received / (received + lost) if received > 0 else 0.0
+
+
+def _along(part: VehicleFlight, place_m: Array) -> tuple[float, float, float]:
+    """Share behind, metres and seconds ahead, at the nearest point of the planned curve."""
+    plan = part.plan
+    if plan is None or len(plan.curve_m) < 2:
+        return (math.nan,) * 3
+    nearest = int(np.argmin(np.sum((plan.curve_m - place_m) ** 2, axis=1)))
+    share = nearest / (len(plan.curve_m) - 1)
+    return share, plan.length_m * (1.0 - share), float(plan.times_s[-1] - plan.times_s[nearest])
