@@ -83,8 +83,8 @@ def test_a_packet_of_the_next_frame_says_that_a_scan_is_whole():
 
 
 def test_a_device_that_was_restarted_is_heard_at_once():
-    lidar = heard(datagram(60_000, frame=200, time_s=NOW_S - 0.1))
-    taken(lidar, now_s=NOW_S)
+    lidar = heard(datagram(60_000, frame=200, time_s=NOW_S - 0.1), now_s=NOW_S - 0.1)
+    assert taken(lidar, now_s=NOW_S - 0.05) is not None
     lidar.receive(datagram(0, frame=0), NOW_S)
     assert taken(lidar).time_s == NOW_S
     assert not lidar.dropped
