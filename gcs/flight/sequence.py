@@ -13,6 +13,7 @@ from gcs.dialect import AUTOPILOT, COMPANION, Mode, mavlink
 from gcs.errors import CommandRefused, FlightAborted, GcsError, LinkLost, PreflightError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions, preflight, safety_parameters, upload
+from gcs.flight.cloud_loop import CloudLoop
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.fence import fence_items
 from gcs.flight.monitor import Phase, VehicleMonitor, describe
@@ -89,6 +90,9 @@ class FleetFlight:
     plan: FleetPlan | None = None
     vehicles: dict[int, VehicleFlight] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.cloud = CloudLoop(self)
+
     @property
     def in_flight(self) -> list[VehicleFlight]:
         return [flight for flight in self.vehicles.values() if flight.monitor.phase.in_flight]
@@ -161,12 +165,14 @@ class FleetFlight:
         await self._for_all(self._start, self.vehicles.values())
 
     async def watch(self) -> None:
-        """Follow the flight until it has ended for every vehicle."""
+        """Follow the flight until it has ended for every vehicle, and replan it meanwhile where both sides plan."""
         async with asyncio.TaskGroup() as orders:
+            replanning = orders.create_task(self.cloud.run(), name="replanning")
             while any(flight.monitor.phase is not Phase.DONE for flight in self.vehicles.values()):
                 for flight in self.vehicles.values():
                     self._watch_one(flight, orders)
                 await asyncio.sleep(WATCH_INTERVAL_S / self.speed)
+            replanning.cancel()
 
     async def hold(self, flight: VehicleFlight) -> None:
         """Stop where it is, on the operator's order."""
@@ -243,8 +249,9 @@ class FleetFlight:
         state = self.state(flight.sysid)
         offset_m = preflight.ground_offset_m(state, flight.vehicle, self.mission)
         flight.monitor.ground_offset_m = offset_m
-        flight.items = self._mission_items(flight, offset_m)
         assert self.plan is not None
+        assert flight.plan is not None
+        flight.items = self.mission_items(flight.plan, offset_m)
         fence = fence_items(self.mission, [part.curve_m for part in self.plan.vehicles])
         await upload.store(self.station, flight.sysid, fence, FENCE)
         await upload.store(self.station, flight.sysid, flight.items)
@@ -254,11 +261,11 @@ class FleetFlight:
             await self._companion_ready(flight)
         flight.monitor.phase = Phase.PREPARED
 
-    def _mission_items(self, flight: VehicleFlight, ground_offset_m: float) -> tuple[MissionItem, ...]:
-        assert flight.plan is not None
-        track, ending = flight.plan.track, None
+    def mission_items(self, plan: VehiclePlan, ground_offset_m: float) -> tuple[MissionItem, ...]:
+        """What is uploaded of a vehicle's plan."""
+        track, ending = plan.track, None
         if self.mode is PlanningMode.ONBOARD:
-            track = flight.plan.targets_alone
+            track = plan.targets_alone
         if self.mode is PlanningMode.CLOUD:
             endings = {OnArrival.LAND: ItemCommand.NAV_LAND, OnArrival.RTL: ItemCommand.NAV_RETURN_TO_LAUNCH}
             ending = endings.get(self.mission.on_arrival)
