@@ -15,7 +15,9 @@ from gcs.errors import GcsError, LinkLost
 from gcs.flight import upload
 from gcs.flight.events import Severity
 from gcs.flight.monitor import Phase
-from gcs.planner.curves import lengths, passing_samples
+from gcs.flight.preparation import mission_items
+from gcs.flight.vehicle_flight import VehicleFlight
+from gcs.planner.curves import lengths
 from gcs.planner.plan import FleetPlan, VehiclePlan
 from gcs.replanning.remaining import Aloft, remaining_mission
 from gcs.replanning.replanner import Cause, Replanner
@@ -27,7 +29,7 @@ from missions.tunnel import CompanionState, Reason
 from missions.world import Box
 
 if TYPE_CHECKING:
-    from gcs.flight.sequence import FleetFlight, VehicleFlight
+    from gcs.flight.sequence import FleetFlight
 
 LOOK_INTERVAL_S = 0.05
 """In vehicle time, as all that follows."""
@@ -118,14 +120,15 @@ class CloudLoop:
     async def _swap(self, part: VehiclePlan, began_s: float) -> bool:
         """Give one vehicle its new mission; False where it may still fly the old one."""
         flight, vehicle = self.flight, self.flight.vehicles[part.sysid]
-        items = flight.mission_items(part, vehicle.monitor.ground_offset_m)
+        items = mission_items(part, flight.mission, flight.mode, vehicle.monitor.ground_offset_m)
         try:
             await upload.store(flight.station, part.sysid, items)
             await self._confirmed(vehicle, plan_id(items))
         except GcsError as problem:
             flight.events.add("swap failed", str(problem), vehicle.name, Severity.WARNING)
             return False
-        vehicle.plan, vehicle.items = part, items
+        vehicle.change_plan(part)
+        vehicle.take_items(items, flight.mission)
         self._progress.pop(part.sysid, None)
         assert flight.plan is not None
         parts = tuple(part if old.sysid == part.sysid else old for old in flight.plan.vehicles)
@@ -135,7 +138,7 @@ class CloudLoop:
         flight.events.add("swapped", f"flies the new plan after {took_s:.2f} s", vehicle.name, plan_id=plan_id(items))
         return True
 
-    async def _confirmed(self, vehicle: "VehicleFlight", expected: int) -> None:
+    async def _confirmed(self, vehicle: VehicleFlight, expected: int) -> None:
         companion = self.flight.state(vehicle.sysid).companion
 
         def flies_it() -> bool:
@@ -153,17 +156,17 @@ class CloudLoop:
             if position_m is None or vehicle.plan is None or not self._is_under_way(vehicle):
                 continue
             plan, done = vehicle.plan, self._progressed(vehicle, position_m)
-            passed = sum(stop <= done for stop in passing_samples(plan.curve_m, plan.stops_m))
+            targets = tuple(target for target in plan.targets if target.name not in vehicle.monitor.route.passed)
             curve_m = plan.curve_m[done:]
             if len(curve_m) > 1 and lengths(plan.curve_m[-1] - position_m) > self._arriving_m:
                 remaining_s = float(plan.times_s[-1] - plan.times_s[done])
-                yield Aloft(vehicle.sysid, position_m, plan.targets[passed:], curve_m, remaining_s)
+                yield Aloft(vehicle.sysid, position_m, targets, curve_m, remaining_s)
 
     @property
     def _arriving_m(self) -> float:
         return max(ARRIVING_M, self.flight.mission.site.arrival_tolerance_m)
 
-    def _is_under_way(self, vehicle: "VehicleFlight") -> bool:
+    def _is_under_way(self, vehicle: VehicleFlight) -> bool:
         status = self.flight.state(vehicle.sysid).companion.status
         if vehicle.monitor.phase is not Phase.FLYING or status is None:
             return False
@@ -172,7 +175,7 @@ class CloudLoop:
             Reason.NO_PATH,
         )
 
-    def _progressed(self, vehicle: "VehicleFlight", position_m: np.ndarray) -> int:
+    def _progressed(self, vehicle: VehicleFlight, position_m: np.ndarray) -> int:
         """Index of the sample of its curve beside which a vehicle is; it does not go back."""
         assert vehicle.plan is not None
         curve_m, before = vehicle.plan.curve_m, self._progress.get(vehicle.sysid, 0)
@@ -192,6 +195,6 @@ class CloudLoop:
                 east_m, north_m, up_m = position_m.tolist()
                 yield Box(name=vehicle.name, centre_m=(east_m, north_m, up_m), half_m=(half_m, half_m, half_m))
 
-    def _position_m(self, vehicle: "VehicleFlight") -> np.ndarray | None:
+    def _position_m(self, vehicle: VehicleFlight) -> np.ndarray | None:
         offset_m = vehicle.monitor.ground_offset_m
         return self.flight.state(vehicle.sysid).position_m(self.flight.mission.frame, offset_m)
