@@ -225,7 +225,7 @@ class FlightApp:
         """Start simulator and companions, as far as the settings ask for them."""
         programs, mission = self.programs, self.flight.mission
         if self._simulated:
-            processes, child = await programs.start_simulator(mission)
+            processes, child = await programs.start_simulator(mission, self.flight.mode)
             programs.watches.append(self._group.create_task(processes.watch(child), name="watch the simulator"))
         await self._settle_origin()
         if self.settings.starts_companions_in(self.flight.mode):

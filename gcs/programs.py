@@ -8,8 +8,9 @@ from pathlib import Path
 from gcs.flight.events import EventLog
 from gcs.processes import Child, Processes
 from gcs.settings import FlightSettings, PlanningMode
+from missions import lidar_packets
 from missions.faults import format_fault
-from missions.mission import Mission
+from missions.mission import Mission, SensorKind
 
 TRUTH_FILE = "truth.csv"
 
@@ -40,13 +41,14 @@ class FlightPrograms:
     def truth_path(self) -> Path:
         return self.log_dir / TRUTH_FILE
 
-    async def start_simulator(self, mission: Mission) -> tuple[Processes, Child]:
+    async def start_simulator(self, mission: Mission, mode: PlanningMode) -> tuple[Processes, Child]:
         """Start the simulator; whoever watches it is returned what to watch."""
         settings = self.settings
         self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in half a minute")
         options = ["--seed", str(settings.seed), "--truth", str(self.truth_path)]
         for fault in settings.simulator_faults:
             options += ["--fault", format_fault(fault)]
+        options.append("--lidar" if settings.simulates_lidar_in(mode) else "--no-lidar")
         processes = await self._simulator.enter_async_context(Processes(self.log_dir))
         return processes, await processes.start("sitl", "sitl", self.source, *options, *self._common_options(mission))
 
@@ -60,6 +62,7 @@ class FlightPrograms:
             options = ["--vehicle", str(vehicle.sysid), "--mission", self.source]
             options += ["--mode", mode.value, "--seed", str(self.settings.seed)]
             options += ["--log", str(self.log_dir / f"{name}.jsonl")]
+            options += self._sensor_options(vehicle.sysid)
             for fault in self.settings.faults:
                 if fault.vehicle == vehicle.sysid:
                     options += ["--fault", format_fault(fault)]
@@ -73,6 +76,13 @@ class FlightPrograms:
         await asyncio.gather(*self.watches, return_exceptions=True)
         await self._companions.aclose()
         await self._simulator.aclose()
+
+    def _sensor_options(self, sysid: int) -> list[str]:
+        """What a companion sees with, and where it hears it."""
+        settings = self.settings
+        port = lidar_packets.FIRST_PORT + sysid - 1 + settings.instance_base
+        address = ["--lidar", f"{settings.lidar_host}:{port}"] if settings.sensor is SensorKind.LIDAR else []
+        return ["--sensor", settings.sensor.value, *address]
 
     def _common_options(self, mission: Mission) -> list[str]:
         origin = mission.origin

@@ -8,6 +8,7 @@ import msgspec
 from gcs.link.url import LinkUrl, Scheme
 from missions.faults import Fault, SimulatorFault
 from missions.frames import GeodeticPoint
+from missions.mission import SensorKind
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 """Names of this machine that nobody else can reach."""
@@ -64,6 +65,10 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     simulator_faults: tuple[SimulatorFault, ...] = ()
     """Beside those of the mission."""
     instance_base: int = 0
+    sensor: SensorKind = SensorKind.LIDAR
+    """Of the companions that are started."""
+    lidar_host: str = "127.0.0.1"
+    """Where the companions that are started hear their lidars."""
     waits: bool = False
     """With a page, nothing begins by itself."""
     token: str | None = None
@@ -77,6 +82,10 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     def starts_companions_in(self, mode: PlanningMode) -> bool:
         """Whether this program starts companions for a flight in this mode."""
         return mode.needs_companions and self.autopilots is not Autopilots.ATTACHED
+
+    def simulates_lidar_in(self, mode: PlanningMode) -> bool:
+        """Whether the simulated vehicles carry range sensors in this mode: somebody looks."""
+        return mode.needs_companions and self.sensor is not SensorKind.NONE
 
     def ground_links(self) -> tuple[LinkUrl, ...]:
         """The links that were asked for, or the usual port on loopback."""

@@ -246,6 +246,9 @@ class Desk:
         if intent is Intent.ALGORITHM and self.planner is not None and details.algorithm is not None:
             self.planner.algorithm = details.algorithm
             return
+        if intent is Intent.REPLAN:
+            flight.cloud.edit(flight.mission)  # nothing has changed but that a new plan is wanted
+            return
         steps = {Intent.PLAN: flight.make_plan, Intent.COMPARE: self._compare, Intent.FLY: flight.fly}
         await self._step(intent, steps[intent])
 

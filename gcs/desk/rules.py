@@ -9,6 +9,7 @@ from gcs.flight import preflight
 from gcs.flight.monitor import Phase
 from gcs.flight.sequence import FleetFlight
 from gcs.flight.vehicle_flight import VehicleFlight
+from gcs.settings import PlanningMode
 
 if TYPE_CHECKING:
     from gcs.desk.desk import Desk
@@ -76,10 +77,12 @@ def _why_not_cancel(desk: "Desk", flight: FleetFlight) -> str | None:
     return IN_FLIGHT if flight.in_flight else None
 
 
-def _why_not_replan(flight: FleetFlight) -> str:
-    if flight.in_flight:
-        return "a plan is made on the ground alone; hold, and send vehicles on by Go to"
-    return "no vehicle is in flight: Plan makes a plan"
+def _why_not_replan(flight: FleetFlight) -> str | None:
+    if not any(part.monitor.phase is Phase.FLYING for part in flight.in_flight):
+        return "no vehicle flies its mission; on the ground, Plan makes a new plan"
+    if flight.mode is not PlanningMode.END_CLOUD:
+        return f"in {flight.mode.value} mode the plan is not changed in flight"
+    return None
 
 
 def _why_not_of_mission(desk: "Desk", intent: Intent, sysid: int) -> str | None:
