@@ -277,7 +277,7 @@ class FlightApp:
         while True:
             await asyncio.sleep(REPORT_INTERVAL_S)
             if self.flight.finished and self.report is None:
-                self.report = self._write_report("")
+                self.report = await asyncio.to_thread(self._write_report, "")
                 self.events.add("ended", f"{'success' if self.report.success else 'failed'}: {self.report.reason}")
 
     def _write_report(self, reason: str) -> FlightReport:

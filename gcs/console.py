@@ -9,7 +9,7 @@ from gcs.planner.plan import FleetPlan
 from gcs.planner.plan import Progress as PlanProgress
 
 STYLES = {Severity.INFO: "", Severity.WARNING: "yellow", Severity.ERROR: "bold red"}
-QUIET_KINDS = {"command"}
+QUIET_KINDS = {"command", "order"}
 """Events that go to the log alone."""
 
 

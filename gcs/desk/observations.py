@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 INTERVAL_S = 0.5
+NOWHERE = (math.nan, math.nan, math.nan)
 QUALITY_WINDOW = 10
 """Observations over which losses are counted: the last five seconds."""
 
@@ -97,7 +98,7 @@ class Observations:
 
     def _outlook(self, desk: "Desk", sysid: int, place_m: Array, clearance_m: float) -> Outlook:
         state, part = desk.vehicles[sysid], desk.part(sysid)
-        progress, to_go_m, eta_s = _along(part, place_m) if part is not None else (math.nan,) * 3
+        progress, to_go_m, eta_s = _along(part, place_m) if part is not None else NOWHERE
         return Outlook(
             position_m=place_m,
             speed_m_s=float(np.linalg.norm(state.velocity_enu_m_s)),
@@ -110,6 +111,8 @@ class Observations:
 
     def _quality(self, sysid: int, count: SourceCount) -> float:
         seen = self._counts.setdefault(sysid, deque(maxlen=QUALITY_WINDOW + 1))
+        if seen and count.received < seen[-1][0]:
+            seen.clear()  # another vehicle has come in its place
         seen.append((count.received, count.lost))
         received, lost = seen[-1][0] - seen[0][0], max(seen[-1][1] - seen[0][1], 0)
         if len(seen) < 3:
@@ -121,7 +124,7 @@ def _along(part: VehicleFlight, place_m: Array) -> tuple[float, float, float]:
     """Share behind, metres and seconds ahead, at the nearest point of the planned curve."""
     plan = part.plan
     if plan is None or len(plan.curve_m) < 2:
-        return (math.nan,) * 3
+        return NOWHERE
     nearest = int(np.argmin(np.sum((plan.curve_m - place_m) ** 2, axis=1)))
     share = nearest / (len(plan.curve_m) - 1)
     return share, plan.length_m * (1.0 - share), float(plan.times_s[-1] - plan.times_s[nearest])

@@ -111,8 +111,8 @@ def _why_not_begin(desk: "Desk", intent: Intent, state: VehicleState, part: Vehi
         return None
     if phase is not Phase.PREPARED:
         return "nothing is uploaded yet"
-    if intent is Intent.TAKE_OFF:
-        return None if state.armed else "not armed"
+    if intent is Intent.TAKE_OFF and state.armed:
+        return None
     assert desk.mission is not None
     return next(preflight.problems(state, part.vehicle, desk.mission, desk.station.now_s), None)
 

@@ -162,9 +162,7 @@ class FleetFlight:
         """
         try:
             for flight in self.vehicles.values():
-                if not self.state(flight.sysid).armed:
-                    await self.orders.arm(flight)
-                await self.orders.take_off(flight)
+                await self._climb(flight)
                 await asyncio.sleep(STAGGER_S / self.speed)
             await _for_all(self.orders.hover, self.vehicles.values())
         except GcsError as problem:
@@ -172,13 +170,13 @@ class FleetFlight:
             raise FlightAborted(f"take-off broken off: {problem}") from problem
 
     async def take_off(self, flight: VehicleFlight) -> None:
-        """Let one vehicle take off that is armed already; ends when it hovers, or is landing again.
+        """Let one vehicle take off, armed or not yet; ends when it hovers, or is landing again.
 
         Raises:
             FlightAborted: it did not get to hover.
         """
         try:
-            await self.orders.take_off(flight)
+            await self._climb(flight)
             await self.orders.hover(flight)
         except GcsError as problem:
             await self.orders.break_off(flight, str(problem))
@@ -234,6 +232,12 @@ class FleetFlight:
             route=RouteWatch(plan.targets[:-1], mission.site.arrival_tolerance_m),
         )
         return VehicleFlight(mission.vehicle(plan.sysid), monitor, plan)
+
+    async def _climb(self, flight: VehicleFlight) -> None:
+        """Arm, unless that was done before and holds still: an autopilot disarms when no take-off follows soon."""
+        if not self.state(flight.sysid).armed:
+            await self.orders.arm(flight)
+        await self.orders.take_off(flight)
 
     async def _start(self, flight: VehicleFlight) -> None:
         try:

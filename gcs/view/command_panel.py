@@ -163,15 +163,15 @@ class CommandPanel:
 
     def _load_file(self, event: viser.GuiEvent) -> None:
         uploaded, name = self._file.value, f"{Path(self._file.value.name).stem or 'mission'}.yaml"
-        try:
-            with TemporaryDirectory() as folder:
-                path = Path(folder) / name
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / name
+            try:
                 path.write_bytes(uploaded.content)
                 mission = load_mission(path)
-        except (MissionError, OSError) as problem:
-            if event.client is not None:
-                tell(event.client, f"{name} was not loaded", str(problem).replace(f"{path}", name))
-            return
+            except (MissionError, OSError) as problem:
+                if event.client is not None:
+                    tell(event.client, f"{name} was not loaded", str(problem).replace(f"{path}", name))
+                return
         self._presses.ask(Intent.LOAD, event.client, Details(new=NewMission(mission, name, uploaded.content)))
 
     def _choose_mode(self, client: viser.ClientHandle | None) -> None:

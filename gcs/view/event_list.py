@@ -10,8 +10,8 @@ from gcs.view.colours import Rgb, css
 SHOWN = 30
 MINUTE_S = 60
 
-QUIET_KINDS = {"stream"}
-"""Of use in the log file alone."""
+QUIET_KINDS = {"stream", "order"}
+"""Of use in the log file alone; orders have a list of their own."""
 
 _CLASSES = {Severity.INFO: "info", Severity.WARNING: "warn", Severity.ERROR: "bad"}
 

@@ -1,16 +1,12 @@
 """The paper's flight on the page: the real programs, a real browser, and somebody who only watches."""
 
-import asyncio
-import contextlib
-import signal
-import sys
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, expect
 
 from tests.browser.conftest import LARGE, tab
+from tests.browser.ground_station import gcs_fly
 from tests.browser.loopback import answering, free_port
 from tests.browser.watching import OUT, row, scene
 
@@ -18,19 +14,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.processes]
 
 INSTANCE_BASE = 700
 FLIGHT_TIMEOUT_MS = 180_000
-
-
-@contextlib.asynccontextmanager
-async def gcs_fly(*options: str) -> AsyncIterator[asyncio.subprocess.Process]:
-    """`gcs fly` with these options; Ctrl-C at the end."""
-    command = [sys.executable, "-m", "gcs", "fly", *options]
-    process = await asyncio.create_subprocess_exec(*command)
-    try:
-        yield process
-    finally:
-        if process.returncode is None:
-            process.send_signal(signal.SIGINT)
-            await asyncio.wait_for(process.wait(), 30.0)
 
 
 async def test_the_indoor_mission_is_flown_before_the_operators_eyes(browser: Browser, tmp_path: Path):

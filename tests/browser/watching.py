@@ -21,6 +21,12 @@ def button(page: Page, name: str) -> Locator:
     return page.get_by_role("button", name=name, exact=True)
 
 
+async def choose(page: Page, label: str, option: str) -> None:
+    """Choose from a dropdown."""
+    await page.get_by_label(label, exact=True).first.click()
+    await page.get_by_role("option", name=option, exact=True).click()
+
+
 def row(page: Page, vehicle: str) -> Locator:
     return page.locator(".gcs-fleet tbody tr", has_text=vehicle)
 
