@@ -43,6 +43,9 @@ LinkOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="of planner and simulator: one seed, one plan")]
 InstanceOption = Annotated[int, typer.Option("--instance-base", min=0, max=10_000, help="shifts all ports")]
+KeysOption = Annotated[
+    Path | None, typer.Option("--keys", metavar="DIR", help="signing keys; see `gcs key`, which has the same option")
+]
 
 
 @app.command()
@@ -68,6 +71,7 @@ def fly(
         ),
     ] = None,
     instance_base: InstanceOption = 0,
+    keys: KeysOption = None,
 ) -> None:
     """Fly a mission.
 
@@ -105,6 +109,7 @@ def fly(
         faults=tuple(one for one in faults if isinstance(one, Fault)),
         simulator_faults=tuple(one for one in faults if isinstance(one, SimulatorFault)),
         instance_base=instance_base,
+        keys=keys,
     )
     raise typer.Exit(_run_flight(settings, load_mission(mission)))
 
@@ -172,6 +177,7 @@ def check(mission: MissionArgument) -> None:
 def watch(
     link: LinkOption = None,
     port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
+    keys: KeysOption = None,
 ) -> None:
     """Show whatever is on the links in the web page, and command it from there.
 
@@ -184,11 +190,11 @@ def watch(
     from gcs.view.server import serve_page
     from gcs.watch import watch as run_watch
 
-    links = tuple(parse_link_url(text) for text in link or ()) or chosen.FlightSettings(mission="").ground_links()
+    settings = chosen.FlightSettings(mission="", links=tuple(parse_link_url(text) for text in link or ()), keys=keys)
     console = FlightConsole()
     events = EventLog(time.monotonic, listeners=[console.show])
     console.say(f"page: http://127.0.0.1:{port}")
-    asyncio.run(run_watch(links, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
+    asyncio.run(run_watch(settings, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
 
 
 @app.command()

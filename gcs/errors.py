@@ -9,6 +9,10 @@ class UsageError(GcsError):
     """The operator asked for something that cannot be: exit code 2, nothing was sent."""
 
 
+class KeyRingError(UsageError):
+    """Signing keys that cannot be read, or be kept."""
+
+
 class LinkLost(GcsError):
     """No answer, in spite of repeated requests."""
 
