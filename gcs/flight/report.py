@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.dialect import AUTOPILOT
-from gcs.flight.sequence import FleetFlight, VehicleFlight
+from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trail
+from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.link.codec import SourceCount
 from missions import obstacles
 from missions.mission import Mission
