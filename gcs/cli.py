@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs import settings as chosen
+from gcs.commands.convert import convert
+from gcs.commands.replay import replay
 from gcs.errors import GcsError, UsageError
 from gcs.link.url import parse_link_url
 from missions.errors import MissionError
@@ -254,6 +256,10 @@ def missions() -> None:
         print(f"{name:20} {load_mission(name).description}")
 
 
+app.command()(convert)
+app.command()(replay)
+
+
 def main() -> None:
     """Entry point of the console script: errors become a sentence and an exit code."""
     signal.signal(signal.SIGTERM, _as_interrupt)
@@ -271,7 +277,7 @@ def main() -> None:
 
 def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     from gcs.console import FlightConsole, PlanConsole
-    from gcs.flight.events import EventLog
+    from gcs.flight.events import BEGAN, EventLog
     from gcs.planner_process import PlannerProcess
 
     if isinstance(settings.origin, GeodeticPoint):
@@ -279,6 +285,7 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     console = FlightConsole()
     with _work_dir(settings.report_dir) as work_dir, PlanConsole(console.console) as progress:
         events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
+        events.add(BEGAN, f"gcs fly {settings.mission}", unix_us=time.time_ns() // 1000)
         with PlannerProcess("ecpso", settings.seed, [progress.show]) as planner:
             report = asyncio.run(_fly(settings, mission, planner, events, work_dir))
         events.close()
