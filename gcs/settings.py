@@ -9,6 +9,7 @@ from gcs.folders import key_folder
 from gcs.link.url import LinkUrl, Scheme
 from missions.faults import Fault, SimulatorFault
 from missions.frames import GeodeticPoint
+from missions.mission import SensorKind
 
 
 class PlanningMode(Enum):
@@ -64,10 +65,19 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     instance_base: int = 0
     keys: Path | None = None
     """Folder of the signing keys; None for the usual one."""
+    sensor: SensorKind = SensorKind.LIDAR
+    """Of the companions that are started."""
+    lidar_host: str = "127.0.0.1"
+    """Where the companions that are started hear their lidars."""
 
     @property
     def starts_companions(self) -> bool:
         return self.mode.needs_companions and self.autopilots is not Autopilots.ATTACHED
+
+    @property
+    def simulates_lidar(self) -> bool:
+        """The simulated vehicles carry range sensors: somebody looks."""
+        return self.mode.needs_companions and self.sensor is not SensorKind.NONE
 
     def ground_links(self) -> tuple[LinkUrl, ...]:
         """The links that were asked for, or the usual port on loopback."""

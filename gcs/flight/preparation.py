@@ -16,6 +16,7 @@ from gcs.flight.monitor import Phase, describe
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.command_client import CommandClient
 from gcs.microservices.mission_transfer_client import FENCE
+from gcs.planner.plan import VehiclePlan
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.mission import Mission, OnArrival, Site, Vehicle
@@ -94,7 +95,8 @@ class Preparation:
         state = self._state(flight)
         offset_m = preflight.ground_offset_m(state, flight.vehicle, self.mission)
         flight.monitor.ground_offset_m = offset_m
-        flight.take_items(self._mission_items(flight, offset_m), self.mission)
+        assert flight.plan is not None
+        flight.take_items(mission_items(flight.plan, self.mission, self.mode, offset_m), self.mission)
         fence = fence_items(self.mission, curves_m)
         await upload.store(self.station, flight.sysid, fence, FENCE)
         await upload.store(self.station, flight.sysid, flight.items)
@@ -115,22 +117,6 @@ class Preparation:
             except CommandRefused:  # a PX4 sends MISSION_CURRENT at its own rate alone
                 name = mavlink.mavlink_map[message_id].msgname
                 self.events.add("stream", f"the autopilot keeps its own rate of {name}", vehicle.name)
-
-    def _mission_items(self, flight: VehicleFlight, ground_offset_m: float) -> tuple[MissionItem, ...]:
-        assert flight.plan is not None
-        track, ending = flight.plan.track, None
-        if self.mode is PlanningMode.ONBOARD:
-            track = flight.plan.targets_alone
-        if self.mode is PlanningMode.CLOUD:
-            endings = {OnArrival.LAND: ItemCommand.NAV_LAND, OnArrival.RTL: ItemCommand.NAV_RETURN_TO_LAUNCH}
-            ending = endings.get(self.mission.on_arrival)
-        return encode_track(
-            track,
-            self.mission.frame,
-            acceptance_radius_m=0.3 if self.mission.site is Site.INDOOR else 2.0,
-            ground_offset_m=ground_offset_m,
-            ending=ending,
-        )
 
     async def _ready_to_arm(self, flight: VehicleFlight) -> None:
         def problems() -> list[str]:
@@ -160,3 +146,22 @@ class Preparation:
         if status.plan_id != expected:
             return f"its companion has plan {status.plan_id:08x}, uploaded was {expected:08x}"
         return f"its companion is {describe(status.state, status.reason)}"
+
+
+def mission_items(
+    plan: VehiclePlan, mission: Mission, mode: PlanningMode, ground_offset_m: float
+) -> tuple[MissionItem, ...]:
+    """What is stored on a vehicle of its plan: all track points, or the targets alone where the companion plans."""
+    track, ending = plan.track, None
+    if mode is PlanningMode.ONBOARD:
+        track = plan.targets_alone
+    if mode is PlanningMode.CLOUD:
+        endings = {OnArrival.LAND: ItemCommand.NAV_LAND, OnArrival.RTL: ItemCommand.NAV_RETURN_TO_LAUNCH}
+        ending = endings.get(mission.on_arrival)
+    return encode_track(
+        track,
+        mission.frame,
+        acceptance_radius_m=0.3 if mission.site is Site.INDOOR else 2.0,
+        ground_offset_m=ground_offset_m,
+        ending=ending,
+    )

@@ -13,6 +13,7 @@ from gcs.dialect import Mode
 from gcs.errors import CommandRefused, FlightAborted, GcsError, LinkLost, PreflightError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions
+from gcs.flight.cloud_loop import CloudLoop
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.monitor import Phase, VehicleMonitor
 from gcs.flight.preparation import Preparation
@@ -55,6 +56,9 @@ class FleetFlight:
     unattended: bool = True
     plan: FleetPlan | None = None
     vehicles: dict[int, VehicleFlight] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.cloud = CloudLoop(self)
 
     @property
     def in_flight(self) -> list[VehicleFlight]:
@@ -160,12 +164,14 @@ class FleetFlight:
         await _for_all(self._start, self._these(parts))
 
     async def watch(self) -> None:
-        """Follow the flight until no vehicle is in flight any more."""
+        """Follow the flight until no vehicle is in flight any more; replan it meanwhile where both sides plan."""
         async with asyncio.TaskGroup() as orders:
+            replanning = orders.create_task(self.cloud.run(), name="replanning")
             while self.in_flight:
                 for flight in self.in_flight:
                     self._watch_one(flight, orders)
                 await asyncio.sleep(WATCH_INTERVAL_S / self.speed)
+            replanning.cancel()
 
     async def hold_all(self, reason: str) -> None:
         """Leave everything that flies holding, as well as the links allow."""

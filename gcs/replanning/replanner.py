@@ -104,7 +104,7 @@ class Replanner:
             now_s: vehicle time.
         """
         if not plan.feasible:
-            self._not_before_s = now_s + self.settings.retry_s
+            self.put_off(now_s)
             return "; ".join(str(violation) for violation in plan.violations)
         self._not_before_s, self._review_s = now_s + self.settings.interval_s, now_s + self.settings.review_s
         self.planned_changes = changes  # the plan that is flown from now on, old or new, is good for this map
@@ -112,6 +112,14 @@ class Replanner:
             return "it is not materially better"
         self._edited = False
         return ""
+
+    def put_off(self, now_s: float) -> None:
+        """There was no plan at all: try again later."""
+        self._not_before_s = now_s + self.settings.retry_s
+
+    def forget_plan(self) -> None:
+        """Not every vehicle has got the new plan: what is flown may not know the map, so it is looked at anew."""
+        self.planned_changes = -1
 
     def _materially_better(self, plan: FleetPlan, aloft: Sequence[Aloft]) -> bool:
         now_takes_s = max(vehicle.remaining_s for vehicle in aloft)
