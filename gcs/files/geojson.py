@@ -1,6 +1,6 @@
 """GeoJSON (RFC 7946): areas in (polygons, their holes as areas to keep out of), plans and flown tracks out."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -11,7 +11,7 @@ from gcs.files.shapes import Shape, corners_of, shapes_of
 MOST_AREAS = 1000
 MOST_DEPTH = 20
 
-Position = tuple[float, float] | tuple[float, float, float]
+Position = Annotated[list[float], msgspec.Meta(min_length=2, max_length=4)]
 
 
 def parse_geojson(data: bytes, name: str) -> tuple[PlanDocument, list[str]]:
@@ -106,7 +106,7 @@ def _feature(shape: Shape) -> dict[str, Any]:
         geometry = {"type": "Point", "coordinates": points[0]}
     else:
         geometry = {"type": "LineString", "coordinates": points}
-    properties = {"name": shape.name, "kind": shape.kind.value}
+    properties: dict[str, Any] = {"name": shape.name, "kind": shape.kind.value}
     if shape.closed:
         properties["inclusion"] = shape.inclusion
     return {"type": "Feature", "properties": properties, "geometry": geometry}

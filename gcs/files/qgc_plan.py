@@ -195,7 +195,7 @@ class _Reader:
         problem = f"the file does not hold the items of this complex item ({kind!r}): expected them in {key}.Items"
         raise BadFile(self._name, key, f"{problem}; it cannot be flown without")
 
-    def _item(self, key: str, item: _SimpleItem, indices: dict[int | None, int]) -> MissionItem:
+    def _item(self, key: str, item: _SimpleItem, indices: dict[int, int]) -> MissionItem:
         if not item.auto_continue:
             raise BadFile(self._name, f"{key}.autoContinue", "expected true, found false: no autopilot here waits so")
         params = [math.nan if value is None else value for value in item.params]
@@ -207,9 +207,10 @@ class _Reader:
             raise BadFile(self._name, key, str(wrong)) from None
         if item.command != ItemCommand.DO_JUMP:
             return built
-        if item.params[0] not in indices:
-            raise BadFile(self._name, f"{key}.params[0]", f"expected the doJumpId of an item, found {item.params[0]}")
-        return msgspec.structs.replace(built, param1=float(indices[int(item.params[0] or 0)]))
+        target = item.params[0]
+        if target is None or target not in indices:
+            raise BadFile(self._name, f"{key}.params[0]", f"expected the doJumpId of an item, found {target}")
+        return msgspec.structs.replace(built, param1=float(indices[int(target)]))
 
     def _decoded(self, key: str, raw: Any, kind: type[_SimpleItem]) -> _SimpleItem:
         try:

@@ -35,7 +35,12 @@ def played_to(position_s: float) -> Player:
 
 def test_a_player_stands_at_the_beginning():
     player = Player(RECORDING)
-    assert (player.position_s, player.duration_s, player.playing, player.fleet.vehicles.keys()) == (0, 60, False, {1, 2})
+    assert (player.position_s, player.duration_s, player.playing, player.fleet.vehicles.keys()) == (
+        0,
+        60,
+        False,
+        {1, 2},
+    )
     player.advance(1.0)
     player.advance(100.0)
     assert player.position_s == 0.0
