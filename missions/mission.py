@@ -175,6 +175,8 @@ class Simulation(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     positioning: Positioning = Positioning()
     ground_link: LinkSettings = LinkSettings()
     onboard_link: LinkSettings = LinkSettings()
+    fleet_link: LinkSettings = LinkSettings()
+    """Between any two companions."""
     wind_enu_m_s: Point3 = (0.0, 0.0, 0.0)
     gust_std_m_s: NotNegative = 0.0
     faults: tuple[SimulatorFault, ...] = ()
