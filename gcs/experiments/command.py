@@ -40,7 +40,9 @@ def run_experiment(order: Order, console: Console) -> None:
         UsageError: before anything is run, if it cannot be.
         ProcessFailed: a worker has ended by itself.
     """
-    conduct(find_experiment(order.name), order, console, f"gcs experiment {order.name}")
+    experiment = find_experiment(order.name)
+    again = f"gcs experiment {order.name} --runs {order.runs or experiment.default_runs} --seed0 {order.seed0}"
+    conduct(experiment, order, console, again)
 
 
 def conduct(experiment: Experiment, order: Order, console: Console, command: str) -> list[Row]:
@@ -50,7 +52,7 @@ def conduct(experiment: Experiment, order: Order, console: Console, command: str
         experiment: what is run.
         order: its `name` is not read.
         console: for the progress.
-        command: that runs this experiment, for its summary.
+        command: that does the same again, for its summary.
     """
     if order.executor is not None:
         check_scheduler(order.executor)
@@ -112,8 +114,7 @@ def _make(directory: Path) -> None:
 
 def _write_results(experiment: Experiment, rows: list[Row], order: Order, command: str) -> list[Path]:
     pictures = experiment.figures(rows, order.output)
-    again = f"{command} --runs {order.runs or experiment.default_runs} --seed0 {order.seed0}"
     summary = order.output / f"{experiment.name}.md"
-    head = f"# {experiment.title}\n\n`{again}`: {len(rows)} runs, in {experiment.name}.csv."
+    head = f"# {experiment.title}\n\n`{command}`: {len(rows)} runs, in {experiment.name}.csv."
     summary.write_text(f"{head}\n\n{experiment.summary(rows)}\n", encoding="utf-8")
     return [order.output / f"{experiment.name}.csv", summary, *(order.output / name for name in pictures)]

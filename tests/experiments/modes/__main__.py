@@ -20,7 +20,7 @@ def main() -> int:
         parser.error(f"--seeds {options.seeds}: expected A:B with A < B")
     order = Order("modes", int(end) - int(first), int(first), None, options.output)
     console = Console(highlight=False, soft_wrap=True)
-    rows = conduct(EXPERIMENT, order, console, "python -m tests.experiments.modes")
+    rows = conduct(EXPERIMENT, order, console, f"make experiment-modes SEEDS={options.seeds}")
     missed = shortfalls(rows)
     for line in missed:
         console.print(line, markup=False)

@@ -1,4 +1,4 @@
-"""Three modes in worlds that are not as mapped, over links of three qualities: flown in process, and judged by the truth."""
+"""Three modes in worlds that are not as mapped, over three links: flown in process, and judged by the truth."""
 
 from collections.abc import Sequence
 from itertools import product as combinations
@@ -61,7 +61,9 @@ def shortfalls(rows: Sequence[Row]) -> list[str]:
     found: list[str] = []
     for world, link in combinations(World, Link):
         cell = select(rows, world=world.name, link=link.name)
-        rates = {mode: share(select(cell, mode=mode.value), "success") for mode in MODES if select(cell, mode=mode.value)}
+        rates = {
+            mode: share(select(cell, mode=mode.value), "success") for mode in MODES if select(cell, mode=mode.value)
+        }
         if len(rates) < len(MODES):
             continue
         both, better = rates[PlanningMode.END_CLOUD], max(rates[PlanningMode.CLOUD], rates[PlanningMode.ONBOARD])
@@ -75,13 +77,25 @@ def shortfalls(rows: Sequence[Row]) -> list[str]:
 
 def summary(rows: Sequence[Row]) -> str:
     """Success, time, way and clearance of every cell, and what is not as it should be."""
-    head = ["world", "link", "mode", "flights", "success", "collided", "flight s", "way m", "clearance m", "kB", "swap s"]
+    head = [
+        "world",
+        "link",
+        "mode",
+        "flights",
+        "success",
+        "collided",
+        "flight s",
+        "way m",
+        "clearance m",
+        "kB",
+        "swap s",
+    ]
     lines = [_line(rows, *cell) for cell in combinations(World, Link, MODES)]
     preface = (
-        "Two vehicles in the paper's room, its obstacles moved by the seed; a pillar that the map lacks or has elsewhere "
-        "stands on the way that the cloud plans; the dead end is a pocket of three walls. All flights in process on a "
-        "virtual clock, judged by the simulator's truth. Median [quartiles]; clearance is that of the centre, a vehicle "
-        "has 0.2 m radius; kB are those of the ground link, both ways, both vehicles."
+        "Two vehicles in the paper's room, its obstacles moved by the seed; a pillar that the map lacks or has "
+        "elsewhere stands on the way that the cloud plans; the dead end is a pocket of three walls. All flights in "
+        "process on a virtual clock, judged by the simulator's truth. Median [quartiles]; clearance is that of the "
+        "centre, a vehicle has 0.2 m radius; kB are those of the ground link, both ways, both vehicles."
     )
     missed = shortfalls(rows)
     verdict = "All promises kept." if not missed else "Not as promised:\n\n" + "\n".join(f"* {line}" for line in missed)
@@ -99,7 +113,9 @@ def figures(rows: Sequence[Row], directory: Path) -> list[str]:
                 heights = [100.0 * share(cell, "success") if cell else 0.0 for cell in cells]
                 places = np.arange(len(World)) + 0.27 * (offset - 1)
                 axes.bar(places, heights, 0.25, color=COLOURS[mode], label=mode.value)
-            axes.set_xticks(range(len(World)), [world.value.replace(" from the map", "") for world in World], fontsize=6)
+            axes.set_xticks(
+                range(len(World)), [world.value.replace(" from the map", "") for world in World], fontsize=6
+            )
             axes.set_title(link.value, fontsize=8)
         axes.legend(fontsize=6)
         figure.supylabel("flights that succeeded [%]", fontsize=8)
