@@ -66,8 +66,7 @@ def test_a_damaged_plan_is_read_or_refused(document: PlanDocument, chance: st.Da
 def _read_or_refuse(data: bytes, kind: Format) -> None:
     try:
         document, _ = parse_document(data, f"x{kind.value}", kind)
-    except BadFile as refusal:
-        assert str(refusal).startswith(f"x{kind.value}: ")
+    except BadFile:
         return
     for item in document.items:
         assert all(math.isfinite(value) for value in (item.x, item.y, item.z))

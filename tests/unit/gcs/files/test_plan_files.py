@@ -30,7 +30,8 @@ def plan(*items: dict[str, Any], **changes: Any) -> dict[str, Any]:
     }  # fmt: skip
     written = {
         "fileType": "Plan", "geoFence": {"circles": [], "polygons": [], "version": 2},
-        "groundStation": "QGroundControl", "mission": mission, "rallyPoints": {"points": [], "version": 2}, "version": 1,
+        "groundStation": "QGroundControl", "mission": mission,
+        "rallyPoints": {"points": [], "version": 2}, "version": 1,
     }  # fmt: skip
     return written | changes
 
