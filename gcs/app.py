@@ -12,12 +12,13 @@ import msgspec
 from gcs.desk import Desk
 from gcs.desk.desk import PlannerChoice
 from gcs.desk.intents import NewMission
-from gcs.errors import GcsError, ProcessFailed, UsageError
+from gcs.errors import GcsError, KeyRingError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.picture import draw_flight
 from gcs.flight.preflight import origin_here
 from gcs.flight.preparation import CONNECT_TIMEOUT_S
 from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
+from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
 from gcs.link.simulator_control import ControlPort
@@ -25,6 +26,7 @@ from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
 from gcs.programs import FlightPrograms
+from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere, PlanningMode
 from gcs.station import Station
 from missions.errors import MissionError
@@ -70,7 +72,7 @@ class FlightApp:
         self.settings, self.work_dir, self.events = settings, work_dir, events
         self._planner, self._page = planner, page
         self.station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
-        self.programs = FlightPrograms(settings, settings.mission, events, work_dir)
+        self.programs = self._new_programs(mission, settings.mission, work_dir)
         self.flight = self._new_flight(mission, settings.mode)
         self.desk = Desk(
             self.station,
@@ -121,7 +123,7 @@ class FlightApp:
         if new is not None and new.content is not None:
             source = str(log_dir / f"{mission.name}.yaml")
             await asyncio.to_thread(Path(source).write_bytes, new.content)
-        self.programs = FlightPrograms(self.settings, source, self.events, log_dir)
+        self.programs = self._new_programs(mission, source, log_dir)
         if self._simulated:
             self.station.forget()
         if isinstance(self.settings.origin, GeodeticPoint):
@@ -137,6 +139,14 @@ class FlightApp:
     @property
     def _simulated(self) -> bool:
         return self.settings.autopilots is Autopilots.SIMULATED
+
+    def _new_programs(self, mission: Mission, source: str, log_dir: Path) -> FlightPrograms:
+        """The programs of a mission, and the keys with which its vehicles sign."""
+        keys = key_ring(self.settings, mission, log_dir, self.events)
+        self.station.codec.signing = keys.signing(self.station.unix_us)
+        names = {vehicle.sysid: vehicle.name for vehicle in mission.vehicles}
+        self._security = SecurityWatch(self.station, self.events, names)
+        return FlightPrograms(self.settings, source, self.events, log_dir, keys.keys_path)
 
     def _new_flight(self, mission: Mission, mode: PlanningMode) -> FleetFlight:
         return FleetFlight(
@@ -270,6 +280,7 @@ class FlightApp:
             assert self.desk.trails is not None
             self.desk.trails.sample(self.station.fleet, offsets_m)
             self.desk.collect_texts()
+            self._security.look(self.station.now_s)
             await asyncio.sleep(TRAIL_INTERVAL_S / self.settings.speed)
 
     async def _write_reports(self) -> None:
@@ -306,6 +317,27 @@ async def _is_set(event: asyncio.Event, timeout_s: float) -> bool:
         async with asyncio.timeout(timeout_s):
             await event.wait()
     return event.is_set()
+
+
+def key_ring(settings: FlightSettings, mission: Mission, work_dir: Path, events: EventLog) -> KeyRing:
+    """The keys of a flight. Simulated vehicles are given theirs: they are made here when they are needed first.
+
+    Raises:
+        KeyRingError: keys of real vehicles cannot be used; simulated ones get keys for this flight alone.
+    """
+    ring = KeyRing(settings.key_folder())
+    if settings.autopilots is not Autopilots.SIMULATED:
+        return ring
+    sysids = [vehicle.sysid for vehicle in mission.vehicles]
+    try:
+        ring.ensure(sysids)
+    except KeyRingError as problem:
+        if settings.keys is not None:
+            raise
+        events.add("security", f"{problem}; this flight has keys of its own", severity=Severity.WARNING)
+        ring = KeyRing(work_dir / "keys")
+        ring.ensure(sysids)
+    return ring
 
 
 def _first(group: BaseExceptionGroup) -> BaseException:

@@ -2,7 +2,7 @@
 
 import asyncio
 from contextlib import AsyncExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from gcs.flight.events import EventLog
@@ -24,13 +24,14 @@ class FlightPrograms:
         source: the mission's path or shipped name, as the programs read it.
         events: the log.
         log_dir: where the programs' output and the simulator's truth go.
+        keys_path: the simulated vehicles' signing keys.
     """
 
     settings: FlightSettings
     source: str
     events: EventLog
     log_dir: Path
-    companions: list[Child] = field(default_factory=list)
+    keys_path: Path
 
     def __post_init__(self) -> None:
         self._simulator, self._companions = AsyncExitStack(), AsyncExitStack()
@@ -46,6 +47,7 @@ class FlightPrograms:
         settings = self.settings
         self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in half a minute")
         options = ["--seed", str(settings.seed), "--truth", str(self.truth_path)]
+        options += ["--signing-key", str(self.keys_path)]
         for fault in settings.simulator_faults:
             options += ["--fault", format_fault(fault)]
         options.append("--lidar" if settings.simulates_lidar_in(mode) else "--no-lidar")

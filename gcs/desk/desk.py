@@ -19,14 +19,14 @@ from gcs.desk.observations import Observations
 from gcs.desk.orderly import carry_out
 from gcs.desk.orders import Order, OrderBook, OrderState, outcome_of
 from gcs.desk.seat import CommandSeat
-from gcs.dialect import mavlink
 from gcs.errors import GcsError
 from gcs.fleet.vehicle_state import VehicleState
-from gcs.flight.events import EventLog, Severity
+from gcs.flight.events import EventLog, Severity, severity_of
 from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trails
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.planner.plan import Progress
+from gcs.replay.player import Player
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.errors import MissionError
@@ -74,6 +74,8 @@ class Desk:
     """Of the plan that is being made, or was made last."""
     running: Intent | None = None
     """The step of the whole flight that is under way."""
+    player: Player | None = None
+    """What is shown is a recording: nothing can be commanded, but time can be moved."""
     simulated: bool = False
     """The vehicles fly in the bundled simulator, so what the mission keeps from its planners is there, too."""
     opener: Opener | None = None
@@ -123,14 +125,19 @@ class Desk:
         self.plan_progress.append(progress)
 
     def collect_texts(self) -> None:
-        """Take what the autopilots have said since the last call into the event log; repetitions are left out."""
+        """Take what the autopilots have said since the last call into the event log; repetitions are left out.
+
+        A recording's log has it already.
+        """
+        if self.player is not None:
+            return
         for sysid, state in self.vehicles.items():
             heard_s = self._texts_heard_s.get(sysid, -math.inf)
             for said in [text for text in state.texts if text.time_s > heard_s]:
                 self._texts_heard_s[sysid] = said.time_s
                 if said.time_s - self._quoted_s.get((sysid, said.text), -math.inf) > REPEATED_S:
                     self._quoted_s[sysid, said.text] = said.time_s
-                    self.events.add("said", said.text, self.name(sysid), _severity(said.severity))
+                    self.events.add("said", said.text, self.name(sysid), severity_of(said.severity))
         old = [key for key, quoted_s in self._quoted_s.items() if self.station.now_s - quoted_s > REPEATED_S]
         for key in old:
             del self._quoted_s[key]
@@ -142,6 +149,8 @@ class Desk:
 
     def why_not(self, intent: Intent, sysids: Iterable[int] = ()) -> str | None:
         """Why an intent cannot be done now, as a phrase; None if it can."""
+        if self.player is not None:
+            return "this is a recording"
         if not intent.concerns_vehicles:
             return rules.why_not_flight(self, intent)
         chosen = list(sysids)
@@ -290,10 +299,3 @@ class Desk:
 
 async def _awaited(work: Awaitable[None]) -> None:
     await work
-
-
-def _severity(mav_severity: int) -> Severity:
-    """Of a STATUSTEXT: MAV_SEVERITY counts downwards from 7, debug."""
-    if mav_severity <= mavlink.MAV_SEVERITY_ERROR:
-        return Severity.ERROR
-    return Severity.WARNING if mav_severity == mavlink.MAV_SEVERITY_WARNING else Severity.INFO

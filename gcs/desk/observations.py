@@ -68,14 +68,23 @@ class Observations:
 
     def observe(self, desk: "Desk", now_s: float) -> None:
         """Look at everything, if it is time to."""
+        if self._next_s - INTERVAL_S > now_s:
+            self._begin_anew()
         if now_s < self._next_s:
             return
         self._next_s = now_s + INTERVAL_S
         self.outlooks = self._look(desk)
         self.histories.record(now_s, self.outlooks)
         self.alerts.update(alarms_of(desk, self.outlooks, now_s), now_s)
-        for change in self.alerts.changes:
+        for change in self.alerts.changes if desk.player is None else ():
             desk.events.add("alert", change.text, change.vehicle, change.severity)
+
+    def _begin_anew(self) -> None:
+        """A recording was moved back."""
+        self._next_s = -math.inf
+        self.histories.clear()
+        self.alerts = AlertBoard()
+        self._counts.clear()
 
     def _look(self, desk: "Desk") -> dict[int, Outlook]:
         placed = [(sysid, place_m) for sysid in desk.vehicles if (place_m := desk.position_m(sysid)) is not None]

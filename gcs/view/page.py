@@ -76,7 +76,8 @@ class Page:
         self._seating = Seating(server, desk.seat)
 
     def update(self, now_s: float) -> None:
-        """Bring the page up to date."""
+        """Bring the page up to date; what is shown has the station's clock, which in a recording can be moved."""
+        shown_s = self._desk.station.now_s
         if self._desk.mission is not self._mission and self._is_another(self._desk.mission):
             self._server.scene.reset()
             self._draw_scene()
@@ -87,15 +88,15 @@ class Page:
         lens = self._cameras.lens()
         with self._server.atomic():
             self._vehicles.move(self._seen, lens)
-            self._motion.update(self._desk, self._seen, now_s)
+            self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + TELL_INTERVAL_S
-                self._desk.observe(now_s)
+                self._desk.observe(shown_s)
                 self._seating.update()
                 self._show_plan()
-                self._tags.show([*self._vehicle_tags(now_s), *self._target_tags], lens)
-                self._panels.update(self._seen, now_s)
+                self._tags.show([*self._vehicle_tags(shown_s), *self._target_tags], lens)
+                self._panels.update(self._seen, shown_s)
             self._tags.move(
                 np.array([tagged.position_m for tagged in self._seen] + self._targets_m).reshape(-1, 3), lens
             )
