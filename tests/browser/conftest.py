@@ -52,12 +52,12 @@ async def open_page(browser: Browser) -> AsyncIterator[OpenPage]:
 
 
 @asynccontextmanager
-async def serving(scripted: ScriptedDesk) -> AsyncIterator[int]:
-    """The port of a scripted desk's page; its vehicles fly on meanwhile."""
+async def serving(scripted: ScriptedDesk, token: str | None = None) -> AsyncIterator[int]:
+    """The port of a scripted desk's page, behind a gateway if there is a token; its vehicles fly on meanwhile."""
     port, shown = free_port(), asyncio.Event()
     tasks = [
         asyncio.create_task(scripted.run()),
-        asyncio.create_task(serve_page(scripted.desk, HOST, port, shown)),
+        asyncio.create_task(serve_page(scripted.desk, HOST, port, shown, token)),
     ]
     try:
         yield port
@@ -71,14 +71,14 @@ async def serving(scripted: ScriptedDesk) -> AsyncIterator[int]:
 
 
 @asynccontextmanager
-async def tab(browser: Browser, port: int, window: tuple[int, int] = SMALL) -> AsyncIterator[Page]:
+async def tab(browser: Browser, port: int, window: tuple[int, int] = SMALL, query: str = "") -> AsyncIterator[Page]:
     """A tab that shows the page on a port, once its panels are there."""
     page = await browser.new_page(viewport={"width": window[0], "height": window[1]})
     page.set_default_timeout(PATIENCE_S * 1000)
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     try:
-        await page.goto(f"http://{HOST}:{port}")
+        await page.goto(f"http://{HOST}:{port}/{query}")
         await page.wait_for_selector(".gcs-fleet")
         yield page
         assert errors == [], "the page raised errors"

@@ -82,13 +82,17 @@ class ScriptedVehicle:
 
     def receive(self, message: Any) -> list[bytes]:
         """What it answers to one message of the ground station."""
-        if message.get_type() != "COMMAND_LONG" or message.target_system != self.sysid:
+        if message.get_type() not in {"COMMAND_LONG", "COMMAND_INT"} or message.target_system != self.sysid:
             return []
         self.commands.append((message.command, message.param2, message.param3))
         if message.command == mavlink.MAV_CMD_DO_SET_MODE:
             main, sub = int(message.param2), int(message.param3)
             self.mode = Mode(sub << 24 | main << 16)
             self.companion = CompanionState.RELEASED if self.companion is not None else None
+        if message.command == mavlink.MAV_CMD_DO_REPOSITION:
+            self.mode = Mode.HOLD
+        if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            self.armed = message.param1 > 0.5
         ack = mavlink.MAVLink_command_ack_message(message.command, mavlink.MAV_RESULT_ACCEPTED)
         return [frame_of(self.sysid, message.target_component, ack)]
 

@@ -4,21 +4,27 @@ import json
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Browser, Page, expect
+from playwright.async_api import Browser, Locator, Page, expect
 
-from tests.browser.conftest import LARGE, tab
+from gcs.dialect import Mode, mavlink
+from tests.browser.conftest import LARGE, OpenPage, serving, tab
 from tests.browser.ground_station import gcs_fly
-from tests.browser.loopback import answering, free_port
-from tests.browser.watching import OUT, button, choose, row
+from tests.browser.loopback import HOST, answering, free_port
+from tests.browser.scripted_desk import ScriptedDesk
+from tests.browser.watching import OUT, button, choose, row, until
 
-pytestmark = [pytest.mark.browser, pytest.mark.processes]
+pytestmark = pytest.mark.browser
 
 INSTANCE_BASE = 730
 FLIGHT_TIMEOUT_MS = 180_000
 
 
-def phase(page: Page):
+def phase(page: Page) -> Locator:
     return page.locator(".gcs-head .phase")
+
+
+def orders(page: Page) -> Locator:
+    return page.locator(".gcs-orders li")
 
 
 async def press(page: Page, name: str) -> None:
@@ -45,19 +51,22 @@ async def load(page: Page, mission: str) -> None:
     await expect(page.locator(".gcs-head h1")).to_have_text(mission)
 
 
+# ---------------------------------------------------------------- whole flights
+
+
+@pytest.mark.processes
 async def test_the_indoor_mission_is_loaded_planned_and_flown_from_the_page_alone(browser: Browser, tmp_path: Path):
     port = free_port()
-    options = ["--sim", "--wait", "--speed", "5", "--port", str(port), "--instance-base", str(INSTANCE_BASE)]
+    options = ["--sim", "--wait", "--speed", "2", "--port", str(port), "--instance-base", str(INSTANCE_BASE)]
     async with gcs_fly("field", *options, "--report", str(tmp_path)):
         await answering(port)
         async with tab(browser, port, LARGE) as page:
             await load(page, "indoor")
             await step_by_step(page)
-            await page.reload()
-            await expect(phase(page)).to_have_text("Flying", timeout=FLIGHT_TIMEOUT_MS)
             await press(page, "Hold")
             await expect(row(page, "alpha")).to_contain_text("interrupted", timeout=FLIGHT_TIMEOUT_MS)
-            await page.screenshot(path=OUT / "operator-hold.png")
+            await page.reload()
+            await expect(phase(page)).to_have_text("Interrupted", timeout=FLIGHT_TIMEOUT_MS)
             await press(page, "Resume")
             await expect(phase(page)).to_have_text("Mission accomplished", timeout=FLIGHT_TIMEOUT_MS)
             await page.screenshot(path=OUT / "operator-indoor.png")
@@ -66,6 +75,7 @@ async def test_the_indoor_mission_is_loaded_planned_and_flown_from_the_page_alon
     assert report["success"], report["reason"]
 
 
+@pytest.mark.processes
 async def test_the_first_terrain_is_flown_by_the_cloud_from_the_page_alone(browser: Browser, tmp_path: Path):
     port = free_port()
     options = ["--sim", "--wait", "--speed", "10", "--port", str(port), "--instance-base", str(INSTANCE_BASE + 20)]
@@ -73,10 +83,108 @@ async def test_the_first_terrain_is_flown_by_the_cloud_from_the_page_alone(brows
         await answering(port)
         async with tab(browser, port, LARGE) as page:
             await choose(page, "Planned by", "cloud")
-            await expect(page.locator(".gcs-head small")).to_contain_text("cloud")
+            await expect(page.locator(".gcs-head small")).to_contain_text("cloud", timeout=FLIGHT_TIMEOUT_MS)
             await step_by_step(page)
             await page.screenshot(path=OUT / "operator-terrain.png")
             await expect(phase(page)).to_have_text("Mission accomplished", timeout=FLIGHT_TIMEOUT_MS)
     report = json.loads((tmp_path / "flight-2" / "report.json").read_text())
     assert (report["mission"], report["mode"]) == ("terrain-1-5uav", "cloud")
     assert report["success"], report["reason"]
+
+
+# ---------------------------------------------------------------- single orders
+
+
+async def hovering() -> ScriptedDesk:
+    """Two vehicles on their way, then held in the air."""
+    scripted = ScriptedDesk("indoor")
+    await scripted.begin(at_s=[2.0, 2.0])
+    return scripted
+
+
+def said(scripted: ScriptedDesk, number: int) -> bool:
+    return all(number in {command for command, _, _ in vehicle.commands} for vehicle in scripted.vehicles)
+
+
+async def test_orders_in_flight_reach_the_vehicles_and_tell_how_they_went(open_page: OpenPage):
+    scripted = await hovering()
+    page = await open_page(scripted, LARGE)
+    await page.get_by_role("tab", name="Orders").click()
+    await press(page, "Hold")
+    await expect(orders(page).first).to_contain_text("Hold")
+    await expect(orders(page).first).to_contain_text("accepted")
+    await press(page, "Speed")
+    await until(lambda: said(scripted, mavlink.MAV_CMD_DO_CHANGE_SPEED), "both fly at another speed")
+    await press(page, "RTL")
+    await until(lambda: all(vehicle.mode is Mode.RTL for vehicle in scripted.vehicles), "both return")
+    await press(page, "Land")
+    await until(lambda: all(vehicle.mode is Mode.LAND for vehicle in scripted.vehicles), "both land")
+    await expect(orders(page).first).to_contain_text("Land")
+
+
+async def test_vehicles_are_sent_to_where_the_operator_clicks(open_page: OpenPage):
+    scripted = await hovering()
+    page = await open_page(scripted, LARGE)
+    await choose(page, "Orders to", "alpha")
+    await press(page, "Go to")
+    await page.wait_for_timeout(500)
+    await page.mouse.click(640, 560)  # on the floor before the crate
+    await until(lambda: scripted.desk.orders.orders[-1].intent.value == "Go to", "the order is there")
+    order = scripted.desk.orders.orders[-1]
+    await until(lambda: order.state.value != "pending", "it has been answered")
+    assert (order.who, order.state.value) == ("alpha", "accepted"), order.reason
+    assert mavlink.MAV_CMD_DO_REPOSITION in {number for number, _, _ in scripted.vehicles[0].commands}
+    assert scripted.vehicles[1].commands == []
+
+
+async def test_motors_stop_only_when_the_button_is_held(open_page: OpenPage):
+    scripted = await hovering()
+    page = await open_page(scripted, LARGE)
+    kill = button(page, "Kill: hold 1.5 s")
+    await expect(kill).to_be_enabled()
+    await kill.click()
+    await page.wait_for_timeout(1000)
+    assert all(vehicle.armed for vehicle in scripted.vehicles)
+    await kill.hover()
+    await page.mouse.down()
+    await until(lambda: not any(vehicle.armed for vehicle in scripted.vehicles), "the motors stand")
+    await page.mouse.up()
+
+
+# ---------------------------------------------------------------- access
+
+
+async def test_of_two_browsers_one_commands_and_the_other_sees_it(browser: Browser):
+    scripted = await hovering()
+    async with serving(scripted) as port, tab(browser, port) as first, tab(browser, port) as second:
+        await expect(first.locator(".gcs-seat")).to_contain_text("You are in command")
+        await expect(second.locator(".gcs-seat")).to_contain_text("browser 1 is in command")
+        await button(second, "Hold").dispatch_event("click")
+        await expect(second.get_by_text("browser 1 is in command").last).to_be_visible()
+        assert scripted.vehicles[0].commands == []
+        await button(second, "Take command").click()
+        await expect(second.locator(".gcs-seat")).to_contain_text("You are in command")
+        await expect(first.locator(".gcs-seat")).to_contain_text("browser 2 is in command")
+        await expect(first.locator(".gcs-events")).to_contain_text("browser 2 has taken command from browser 1")
+        await button(second, "Hold").click()
+        await until(lambda: all(vehicle.mode is Mode.HOLD for vehicle in scripted.vehicles), "both hold")
+        await second.reload()
+        await expect(second.locator(".gcs-seat")).to_contain_text("You are in command")
+
+
+async def test_without_the_token_there_is_no_page(browser: Browser):
+    scripted = await hovering()
+    async with serving(scripted, token="correct horse") as port:
+        page = await browser.new_page()
+        await page.goto(f"http://{HOST}:{port}")
+        await expect(page.locator("form")).to_contain_text("asks for its token")
+        await page.get_by_placeholder("Token").fill("battery staple")
+        await page.get_by_role("button", name="Enter").click()
+        await expect(page.locator(".said")).to_have_text("This is not the token.")
+        await expect(page.locator(".gcs-fleet")).to_have_count(0)
+        await page.screenshot(path=OUT / "operator-door.png")
+        await page.close()
+        async with tab(browser, port, query="?token=correct%20horse") as inside:
+            assert "token" not in inside.url
+            await press(inside, "Hold")
+            await until(lambda: all(vehicle.mode is Mode.HOLD for vehicle in scripted.vehicles), "both hold")

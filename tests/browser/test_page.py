@@ -43,8 +43,8 @@ async def test_the_page_shows_mission_fleet_and_log_and_says_why_buttons_are_off
     for name in ("Upload", "Hold", "Resume", "RTL", "Land"):
         await expect(button(page, name)).to_be_disabled()
     reasons = page.locator(".gcs-reasons")
-    await expect(reasons).to_contain_text("Upload there is no plan yet")
-    await expect(reasons).to_contain_text("Hold, Resume, RTL, Land not in flight")
+    await expect(reasons).to_contain_text("Upload, Arm, Take off, Start there is no plan yet")
+    await expect(reasons).to_contain_text("Hold, Resume, RTL, Land, Go to, Speed, Kill not in flight")
 
 
 async def test_planning_shows_its_progress_and_then_the_plan(open_page: OpenPage):
@@ -117,7 +117,9 @@ async def test_the_end_of_a_mission_is_told(open_page: OpenPage):
     page = await open_page(scripted)
     await expect(page.locator(".gcs-head .phase")).to_have_text("Mission accomplished")
     await expect(row(page, "alpha")).to_contain_text("reached")
-    await expect(page.locator(".gcs-reasons")).to_contain_text("Plan, Upload, Fly this mission has been flown")
+    await expect(page.locator(".gcs-reasons")).to_contain_text(
+        "Plan, Upload, Fly, Arm, Take off, Start this mission has been flown"
+    )
 
 
 async def test_without_a_mission_vehicles_are_watched_and_commanded(open_page: OpenPage):

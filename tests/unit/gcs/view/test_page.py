@@ -173,7 +173,7 @@ async def test_a_long_flight_does_not_swell_what_a_browser_has_to_be_sent(server
     for vehicle in scripted.vehicles:
         vehicle.mode = Mode.HOLD
     shown.fly(60.0)
-    assert len(server._websock_server._broadcast_buffer.message_from_id) <= buffered + 5
+    assert len(server._websock_server._broadcast_buffer.message_from_id) <= buffered + 20  # the plots come meanwhile
 
 
 async def test_what_autopilots_say_is_taken_into_the_log_once(server: viser.ViserServer, indoor: ScriptedDesk):
