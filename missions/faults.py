@@ -55,10 +55,11 @@ class LinkConditions(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 class SimulatedLink(Enum):
-    """One of a vehicle's two links."""
+    """One of a vehicle's two links, or its radio to the other companions."""
 
     GROUND = "ground"
     ONBOARD = "onboard"
+    FLEET = "fleet"
 
 
 class LinkFault(LinkConditions, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="link"):

@@ -14,6 +14,7 @@ from missions.errors import WireFormatError
 from missions.trajectory import Trajectory
 
 VERSION = 1
+TRAJECTORY_VERSION = 2
 MAX_PAYLOAD_BYTES = 128
 
 
@@ -30,8 +31,11 @@ class TrajectoryKind(IntEnum):
     """What a vehicle says of a trajectory that it announces."""
 
     OPTIMISED = 0
+    """Not flown yet: told to the others first, who may object by what they fly."""
     COMMITTED = 1
     BRAKING = 2
+    WANTED = 3
+    """What it would fly if those who yield to it were not in its way."""
 
 
 class CompanionState(IntEnum):
@@ -66,10 +70,12 @@ class Reason(IntEnum):
     INTERNAL_ERROR = 10
     NOT_AIRBORNE = 11
     """On the ground or disarmed: companions take over from hovering."""
+    NO_SENSOR = 12
+    """The range sensor is not heard: whoever cannot see does not move."""
 
 
 class TrajectoryMessage(msgspec.Struct, frozen=True, kw_only=True):
-    """A trajectory that a vehicle flies or wants to fly: 38 bytes of header, then int16 centimetres.
+    """A trajectory that a vehicle flies or wants to fly: 44 bytes of header, then int16 centimetres.
 
     Positions are mission ENU [m]; times are UTC [s], since vehicles share no other clock.
     """
@@ -80,6 +86,12 @@ class TrajectoryMessage(msgspec.Struct, frozen=True, kw_only=True):
     radius_m: float
     trajectory: Trajectory
     """Its `start_s` is UTC [s]."""
+    announced_s: float = 0.0
+    """When it was first told to the others, UTC [s]: earlier ones go first."""
+    age_s: float = 0.0
+    """How long after that this copy was sent; up to 65 s."""
+    rank: int = 0
+    """Who yields: the smaller goes first. A vehicle that makes way for another one has that one's rank; 0 for none."""
 
 
 class CompanionStatus(msgspec.Struct, frozen=True, kw_only=True):
@@ -100,10 +112,11 @@ class CompanionStatus(msgspec.Struct, frozen=True, kw_only=True):
     time_boot_ms: int = 0
 
 
-_TRAJECTORY = struct.Struct("<BBBxIIQiiiIH")
+_TRAJECTORY = struct.Struct("<BBBBIIQiiiIHiH")
 _POINT = struct.Struct("<hhh")
 _STATUS = struct.Struct("<BBBxIIHHHHHHI")
-_KNOT_UNIT_S = 1e-4
+_TIME_UNIT_S = 1e-4
+_FURTHEST_ANNOUNCED = 2**31 - 1
 _CM = 100.0
 
 
@@ -117,16 +130,21 @@ def encode_trajectory(message: TrajectoryMessage) -> bytes:
     relative_cm = points_cm - points_cm[0]
     if _TRAJECTORY.size + len(points_cm) * _POINT.size > MAX_PAYLOAD_BYTES or np.abs(relative_cm).max() > 32767:
         raise ValueError(f"{len(points_cm)} control points over {np.abs(relative_cm).max() / _CM:.0f} m do not fit")
+    trajectory = message.trajectory
+    announced = round((message.announced_s - trajectory.start_s) / _TIME_UNIT_S)
     header = _TRAJECTORY.pack(
-        VERSION,
+        TRAJECTORY_VERSION,
         message.kind,
         len(points_cm),
+        message.rank,
         message.plan_id,
         message.revision,
-        round(message.trajectory.start_s * 1e6),
+        round(trajectory.start_s * 1e6),
         *points_cm[0].tolist(),
-        round(message.trajectory.knot_interval_s / _KNOT_UNIT_S),
-        round(message.radius_m * _CM),
+        round(trajectory.knot_interval_s / _TIME_UNIT_S),
+        _clipped(message.radius_m * _CM),
+        min(max(announced, -_FURTHEST_ANNOUNCED), _FURTHEST_ANNOUNCED),
+        _clipped(message.age_s * 1e3),
     )
     return header + relative_cm.astype("<i2").tobytes()
 
@@ -137,9 +155,10 @@ def decode_trajectory(payload: bytes) -> TrajectoryMessage:
     Raises:
         WireFormatError: wrong version, length, kind or content.
     """
-    version, kind, count, plan, revision, start_us, east, north, up, knot, radius = _unpack(_TRAJECTORY, payload)
+    fields = _unpack(_TRAJECTORY, payload)
+    version, kind, count, rank, plan, revision, start_us, east, north, up, knot, radius, announced, age_ms = fields
     body = payload[_TRAJECTORY.size : _TRAJECTORY.size + count * _POINT.size]
-    if version != VERSION or kind not in set(TrajectoryKind) or count < 4 or knot == 0:
+    if version != TRAJECTORY_VERSION or kind not in set(TrajectoryKind) or count < 4 or knot == 0:
         raise WireFormatError(f"trajectory: version {version}, kind {kind}, {count} points, knot interval {knot}")
     if len(body) != count * _POINT.size:
         raise WireFormatError(f"trajectory: expected {count * _POINT.size} bytes of points, found {len(body)}")
@@ -150,7 +169,10 @@ def decode_trajectory(payload: bytes) -> TrajectoryMessage:
         plan_id=plan,
         revision=revision,
         radius_m=radius / _CM,
-        trajectory=Trajectory(points_m, start_us / 1e6, knot * _KNOT_UNIT_S),
+        trajectory=Trajectory(points_m, start_us / 1e6, knot * _TIME_UNIT_S),
+        announced_s=start_us / 1e6 + announced * _TIME_UNIT_S,
+        age_s=age_ms / 1e3,
+        rank=rank,
     )
 
 

@@ -12,12 +12,14 @@ from missions.faults import (
     MotorFailure,
     Reboot,
     SensorNoise,
+    SimulatedLink,
     SimulatorFault,
     Weather,
 )
 from sitl.autopilot.memory import Charge
 from sitl.fleet import Fleet
 from sitl.link.faulty_link import FaultyLink
+from sitl.link.radio import FleetRadio
 from sitl.microservices.outbox import Link
 
 
@@ -44,11 +46,13 @@ class FaultInjector:
     Args:
         fleet: the bodies, the estimators and the weather.
         vehicles: system id -> what else can be broken.
+        radio: between the companions.
     """
 
-    def __init__(self, fleet: Fleet, vehicles: Mapping[int, Breakable]) -> None:
+    def __init__(self, fleet: Fleet, vehicles: Mapping[int, Breakable], radio: FleetRadio) -> None:
         self._fleet = fleet
         self._vehicles = vehicles
+        self._radio = radio
         self._waiting: list[SimulatorFault] = []
         self._positioning_back_s: dict[int, float] = {}
 
@@ -106,10 +110,14 @@ class FaultInjector:
                 self._vehicles[fault.vehicle].reboot()
 
     def _break_links(self, fault: LinkFault, now_s: float) -> None:
+        black_until_s = now_s + fault.blackout_s
         for sysid in self._named(fault.vehicle):
-            link = self._vehicles[sysid].links[Link(fault.link.value)]
-            link.change(fault)
-            link.black_out(now_s + fault.blackout_s)
+            if fault.link is SimulatedLink.FLEET:
+                self._radio.change(sysid, fault, black_until_s)
+            else:
+                link = self._vehicles[sysid].links[Link(fault.link.value)]
+                link.change(fault)
+                link.black_out(black_until_s)
 
     def _set_positioning(self, sysid: int, *, lost: bool, until_s: float) -> None:
         self._fleet.lose_positioning(self._vehicles[sysid].index, lost=lost)

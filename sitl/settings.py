@@ -5,11 +5,11 @@ from pathlib import Path
 
 from missions.faults import SimulatorFault
 from missions.lidar_packets import FIRST_PORT
-from missions.ports import companion_port
+from missions.ports import FIRST_ONBOARD_PORT, companion_port
 from sitl.dynamics.airframe import AirframeName
 
 GROUND_PORT, GCS_PORT = 18570, 14550
-ONBOARD_PORT = 14580
+ONBOARD_PORT = FIRST_ONBOARD_PORT
 CONTROL_PORT = 14990
 """Where faults are ordered at run time."""
 HIGHEST_INSTANCE_BASE = 65535 - GROUND_PORT - 250

@@ -18,6 +18,7 @@ from sitl.dynamics.state import Crash
 from sitl.fault_injection import Breakable, FaultInjector
 from sitl.fleet import TICK_S, Fleet
 from sitl.link.faulty_link import Direction, FaultyLink
+from sitl.link.radio import FleetRadio
 from sitl.microservices.outbox import Link
 from sitl.microservices.telemetry import Surroundings
 from sitl.open_field import open_field
@@ -131,7 +132,9 @@ class Simulator:
             }
             for sysid, index in self._index.items()
         }
-        self._faults = FaultInjector(self._fleet, {sysid: self._breakable(sysid) for sysid in self._index})
+        self._radio = FleetRadio(mission.simulation.fleet_link, self._index, seed)
+        breakable = {sysid: self._breakable(sysid) for sysid in self._index}
+        self._faults = FaultInjector(self._fleet, breakable, self._radio)
         for fault in mission.simulation.faults:
             self.order(fault)
 
@@ -203,6 +206,14 @@ class Simulator:
         """What the lidars have sent since the last call: (system id, one datagram), in order."""
         out, self._lidar_out = self._lidar_out, []
         return out
+
+    def receive_radio(self, sysid: int, datagram: bytes) -> None:
+        """A vehicle's companion speaks to all others."""
+        self._radio.send(sysid, datagram, self.time_s, self._since_takeoff_s)
+
+    def radio_datagrams(self) -> list[tuple[int, bytes]]:
+        """What companions hear since the last call: (system id of who hears it, one datagram), in order."""
+        return self._radio.arrived(self.time_s)
 
     def _look_around(self) -> None:
         """Let the range sensors scan, if there are any and it is time."""

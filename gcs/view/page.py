@@ -17,6 +17,7 @@ from gcs.view.motion_scene import MotionScene
 from gcs.view.overlay import Tag
 from gcs.view.panels import Panels, Press
 from gcs.view.plan_scene import PlanScene
+from gcs.view.replay_panel import ReplayPanel
 from gcs.view.sightings import Sighting, sightings, vehicle_colours, vehicle_order
 from gcs.view.theme import DARK, LIGHT, Theme
 from gcs.view.vehicle_scene import least_span_px
@@ -61,20 +62,25 @@ class Page:
         self._plan = PlanScene(server.scene, size_m * POINT_SHARE)
         self._motion = MotionScene(server.scene, max(LEAST_TRAIL_SPACING_M, size_m * TRAIL_SPACING_SHARE))
         self._panels = Panels(server, desk, self._press, self._views())
+        self._replay = ReplayPanel(server.gui, desk.player) if desk.player is not None else None
         self._browsers = Browsers(server, self._greet)
         self._use(DARK)
 
     def update(self, now_s: float) -> None:
-        """Bring the page up to date."""
+        """Bring the page up to date; what is shown has the station's clock, which in a recording can be moved."""
+        if self._replay is not None:
+            self._replay.update()
+        shown_s = self._desk.station.now_s
         self._seen = sightings(self._desk)
         with self._server.atomic():
-            self._motion.update(self._desk, self._seen, now_s)
+            self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + TELL_INTERVAL_S
                 self._desk.collect_texts()
                 self._show_plan()
-                self._tags = [*self._vehicle_tags(now_s), *self._target_tags()]
+<<<<<<< HEAD
+                self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
                 self._panels.update(self._seen, now_s)
         places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
         tags = self._tags if len(self._tags) == len(places_m) else []
@@ -100,6 +106,13 @@ class Page:
     def _pick(self, sysid: int, joins: bool) -> None:
         """A vehicle was clicked; called in a thread of viser."""
         self._loop.call_soon_threadsafe(self._panels.pick, sysid, joins)
+=======
+                self._tags.show([*self._vehicle_tags(shown_s), *self._target_tags], lens)
+                self._panels.update(self._seen, shown_s)
+            self._tags.move(
+                np.array([tagged.position_m for tagged in self._seen] + self._targets_m).reshape(-1, 3), lens
+            )
+>>>>>>> hub/main
 
     def _vehicle_tags(self, now_s: float) -> list[Tag]:
         picked, span_px = self._panels.picked_out, least_span_px(len(self._seen)) * VEHICLE_FLATNESS

@@ -1,4 +1,4 @@
-"""The sockets of a fleet: two UDP ports per vehicle, one MAVLink message per datagram, paced by the loop's clock."""
+"""The sockets of a fleet: two UDP ports per vehicle, one for the companions' radio; paced by the loop's clock."""
 
 import asyncio
 import contextlib
@@ -8,6 +8,7 @@ import sys
 from typing import NamedTuple
 
 from missions.lidar_packets import FIRST_PORT
+from missions.ports import FIRST_FLEET_PORT, RADIO_PORT, fleet_port, onboard_port
 from sitl.errors import PortInUse
 from sitl.fleet import TICK_S
 from sitl.link.memory_files import MemoryFiles
@@ -50,6 +51,7 @@ class FleetLinks:
         self._ends: dict[bool, dict[int, End]] = {True: {}, False: {}}
         """Is it the ground link -> system id -> socket and peer."""
         self._lidar: socket.socket | None = None
+        self._radio: socket.socket | None = None
 
     def open(self) -> None:
         """Bind all ports, and receive on them in the running event loop.
@@ -60,6 +62,9 @@ class FleetLinks:
         try:
             self._lidar = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self._lidar.setblocking(False)
+            shift = self._settings.instance_base
+            self._radio = bind(self._settings.host, RADIO_PORT + shift, "fleet radio")
+            asyncio.get_running_loop().add_reader(self._radio, self._receive_radio, self._radio)
             for port in self._ports():
                 self._open_one(port)
         except BaseException:
@@ -79,6 +84,8 @@ class FleetLinks:
                 pass
         if self._lidar is not None:
             self._send_lidar(self._lidar)
+        if self._radio is not None:
+            self._send_radio(self._radio)
 
     def _send_lidar(self, end: socket.socket) -> None:
         first = FIRST_PORT + self._settings.instance_base
@@ -86,7 +93,28 @@ class FleetLinks:
             with contextlib.suppress(OSError):
                 end.sendto(datagram, (self._settings.host, first + sysid - 1))
 
+    def _send_radio(self, end: socket.socket) -> None:
+        shift = self._settings.instance_base
+        for sysid, datagram in self._simulator.radio_datagrams():
+            with contextlib.suppress(OSError):
+                end.sendto(datagram, (self._settings.host, fleet_port(sysid) + shift))
+
+    def _receive_radio(self, end: socket.socket) -> None:
+        """Companions are told apart by the ports from which they speak."""
+        for _ in range(MOST_AT_ONCE):
+            try:
+                datagram, (_, port) = end.recvfrom(LARGEST_DATAGRAM_BYTES)
+            except OSError:
+                break
+            sysid = port - FIRST_FLEET_PORT - self._settings.instance_base + 1
+            self._simulator.receive_radio(sysid, datagram)
+        self._send_radio(end)
+
     def close(self) -> None:
+        if self._radio is not None:
+            asyncio.get_running_loop().remove_reader(self._radio)
+            self._radio.close()
+            self._radio = None
         if self._lidar is not None:
             self._lidar.close()
             self._lidar = None
@@ -105,8 +133,10 @@ class FleetLinks:
         settings, shift = self._settings, self._settings.instance_base
         sysids = list(self._simulator.vehicles)
         ground = [_Port(i, Link.GROUND, GROUND_PORT + i - 1 + shift, GCS_PORT + shift) for i in sysids]
-        own = settings.onboard_port - 1 + shift
-        onboard = [_Port(i, Link.ONBOARD, own + i, settings.companion_port(i) + shift) for i in sysids]
+        onboard = [
+            _Port(i, Link.ONBOARD, onboard_port(i, settings.onboard_port) + shift, settings.companion_port(i) + shift)
+            for i in sysids
+        ]
         taken = {port.own for port in ground + onboard} | {GCS_PORT + shift}
         return ground + [port._replace(peer=None) if port.peer in taken else port for port in onboard]
 

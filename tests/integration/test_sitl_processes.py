@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from missions.lidar_packets import unpack
-from missions.ports import companion_port
+from missions.ports import RADIO_PORT, companion_port, fleet_port, onboard_port
 from sitl.dialect import mavlink
 from tests.integration.sitl_process import SITL, GroundStation, free_instance_base, is_free, running_sitl
 
@@ -139,18 +139,33 @@ def test_garbage_on_its_ports_does_no_harm(base, ground):
         assert ground.until(lambda: ground.last("COMMAND_ACK")).result == 0
 
 
-def test_every_one_of_a_hundred_vehicles_has_its_companions_port(base):
-    sysids = 1, 10, 11, 41, 100
+def test_every_one_of_130_vehicles_has_its_companions_port_and_leaves_those_of_the_fleet_link_free(base):
+    sysids = 1, 10, 11, 41, 120, 121, 130
     ends = {sysid: socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for sysid in sysids}
     with ExitStack() as stack:
         for sysid, end in ends.items():
             stack.enter_context(end)
             end.bind(("127.0.0.1", companion_port(sysid) + base))
             end.settimeout(10.0)
-        stack.enter_context(running_sitl("--vehicles", "100", base=base))
+        stack.enter_context(running_sitl("--vehicles", "130", base=base))
         for sysid, end in ends.items():
             frame, sender = end.recvfrom(2048)
-            assert (frame[5], sender[1]) == (sysid, 14580 + sysid - 1 + base)
+            assert (frame[5], sender[1]) == (sysid, onboard_port(sysid) + base)
+
+
+def test_what_one_companion_says_on_the_fleet_link_the_others_hear(base):
+    ends = {sysid: socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for sysid in (1, 2, 3)}
+    with ExitStack() as stack:
+        for sysid, end in ends.items():
+            stack.enter_context(end)
+            end.bind(("127.0.0.1", fleet_port(sysid) + base))
+            end.settimeout(5.0)
+        stack.enter_context(running_sitl("--vehicles", "3", base=base))
+        ends[2].sendto(b"here", ("127.0.0.1", RADIO_PORT + base))
+        assert [ends[sysid].recv(100) for sysid in (1, 3)] == [b"here", b"here"]
+        ends[2].settimeout(0.2)
+        with pytest.raises(TimeoutError):
+            ends[2].recv(100)
 
 
 def test_a_companions_port_that_is_taken_by_the_simulator_or_the_ground_gets_nothing(base):

@@ -126,16 +126,27 @@ def test_figures_that_are_too_large_are_sent_as_the_largest():
 def trajectory_message(n_points: int = 12) -> TrajectoryMessage:
     points = np.cumsum(np.full((n_points, 3), 0.25), axis=0)
     trajectory = Trajectory(points, start_s=1_700_000_000.25, knot_interval_s=0.4)
-    return TrajectoryMessage(kind=TrajectoryKind.COMMITTED, plan_id=7, revision=3, radius_m=0.2, trajectory=trajectory)
+    return TrajectoryMessage(
+        kind=TrajectoryKind.COMMITTED,
+        plan_id=7,
+        revision=3,
+        radius_m=0.2,
+        trajectory=trajectory,
+        announced_s=1_700_000_000.125,
+        age_s=0.5,
+        rank=9,
+    )
 
 
-def test_a_trajectory_of_twelve_points_takes_110_bytes_and_survives_the_wire():
+def test_a_trajectory_of_twelve_points_takes_116_bytes_and_survives_the_wire():
     payload = encode_trajectory(trajectory_message())
     back = decode_trajectory(payload)
-    assert len(payload) == 110
+    assert len(payload) == 116
     np.testing.assert_allclose(back.trajectory.control_points_m, trajectory_message().trajectory.control_points_m)
     assert back.trajectory.start_s == pytest.approx(1_700_000_000.25, abs=1e-6)
+    assert back.announced_s == pytest.approx(1_700_000_000.125, abs=1e-4)
     assert (back.kind, back.plan_id, back.revision) == (TrajectoryKind.COMMITTED, 7, 3)
+    assert (back.radius_m, back.age_s, back.rank) == (0.2, 0.5, 9)
 
 
 def test_a_slow_climb_over_minutes_survives_the_wire():
@@ -146,8 +157,8 @@ def test_a_slow_climb_over_minutes_survives_the_wire():
 
 def test_a_trajectory_that_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="do not fit"):
-        encode_trajectory(trajectory_message(n_points=16))
-    assert len(encode_trajectory(trajectory_message(n_points=15))) <= MAX_PAYLOAD_BYTES
+        encode_trajectory(trajectory_message(n_points=15))
+    assert len(encode_trajectory(trajectory_message(n_points=14))) <= MAX_PAYLOAD_BYTES
 
 
 @given(payload=st.binary(max_size=128))
@@ -159,7 +170,7 @@ def test_random_payloads_decode_or_are_refused_and_nothing_else(payload: bytes):
             continue
 
 
-@given(cut=st.integers(0, 109))
+@given(cut=st.integers(0, 115))
 def test_truncated_trajectories_are_refused(cut: int):
     with pytest.raises(WireFormatError):
         decode_trajectory(encode_trajectory(trajectory_message())[:cut])
