@@ -79,9 +79,8 @@ class Page:
                 self._next_tell_s = now_s + TELL_INTERVAL_S
                 self._desk.collect_texts()
                 self._show_plan()
-<<<<<<< HEAD
                 self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
-                self._panels.update(self._seen, now_s)
+                self._panels.update(self._seen, shown_s)
         places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
         tags = self._tags if len(self._tags) == len(places_m) else []
         self._browsers.update(self._seen, tags, places_m[: len(tags)])
@@ -106,13 +105,6 @@ class Page:
     def _pick(self, sysid: int, joins: bool) -> None:
         """A vehicle was clicked; called in a thread of viser."""
         self._loop.call_soon_threadsafe(self._panels.pick, sysid, joins)
-=======
-                self._tags.show([*self._vehicle_tags(shown_s), *self._target_tags], lens)
-                self._panels.update(self._seen, shown_s)
-            self._tags.move(
-                np.array([tagged.position_m for tagged in self._seen] + self._targets_m).reshape(-1, 3), lens
-            )
->>>>>>> hub/main
 
     def _vehicle_tags(self, now_s: float) -> list[Tag]:
         picked, span_px = self._panels.picked_out, least_span_px(len(self._seen)) * VEHICLE_FLATNESS
