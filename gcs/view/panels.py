@@ -64,6 +64,15 @@ class Panels:
         """The selected vehicles, if they are not all."""
         return set() if self._selector.value == next(iter(self._choices)) else self.selected
 
+    def pick(self, sysid: int, joins: bool) -> None:
+        """Address orders to a vehicle that was clicked, or to it beside those that were."""
+        names = vehicle_names(self._desk)
+        chosen = sorted((self.picked_out if joins else set()) | {sysid})
+        if len(chosen) > 1 and SEVERAL in self._choices:
+            self._names.value, self._selector.value = ", ".join(names[one] for one in chosen), SEVERAL
+        elif len(names) > 1:
+            self._selector.value = next(name for name, own in self._choices.items() if own == [sysid])
+
     @property
     def go_to_height_m(self) -> float:
         """Above the ground of the place that vehicles are sent to."""
