@@ -28,6 +28,8 @@ class Router:
             return False
         target = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
+        if message.get_type() == "MANUAL_CONTROL":  # its receiver has another name
+            target = message.target
         if target == 0:
             return True
         if target == self._sysid and component == AUTOPILOT_COMPID:
