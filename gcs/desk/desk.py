@@ -156,8 +156,13 @@ class Desk:
         chosen = list(sysids)
         if not chosen:
             return "no vehicle is selected"
-        reasons = [rules.why_not_vehicle(self, intent, sysid) for sysid in chosen]
-        return None if None in reasons else reasons[0]
+        first: str | None = None
+        for sysid in chosen:
+            why_not = rules.why_not_vehicle(self, intent, sysid)
+            if why_not is None:
+                return None
+            first = first or why_not
+        return first
 
     def request(
         self, intent: Intent, sysids: Iterable[int] = (), details: Details = NO_DETAILS, by: str | None = None

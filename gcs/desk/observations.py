@@ -87,13 +87,13 @@ class Observations:
         self._counts.clear()
 
     def _look(self, desk: "Desk") -> dict[int, Outlook]:
-        placed = [(sysid, place_m) for sysid in desk.vehicles if (place_m := desk.position_m(sysid)) is not None]
-        if not placed:
+        sysids, places_m = _places_m(desk)
+        if not sysids:
             return {}
-        clear_m = self._clearances_m(desk, np.array([place_m for _, place_m in placed]))
+        clear_m = self._clearances_m(desk, places_m)
         return {
             sysid: self._outlook(desk, sysid, place_m, float(free_m))
-            for (sysid, place_m), free_m in zip(placed, clear_m, strict=True)
+            for sysid, place_m, free_m in zip(sysids, places_m, clear_m, strict=True)
         }
 
     def _clearances_m(self, desk: "Desk", places_m: Array) -> Array:
@@ -127,6 +127,18 @@ class Observations:
         if len(seen) < 3:
             return math.nan
         return received / (received + lost) if received > 0 else 0.0
+
+
+def _places_m(desk: "Desk") -> tuple[list[int], Array]:
+    """Who is known to be somewhere, and (n, 3) where: all at once, since a hundred one by one take long."""
+    seen = [(sysid, state.place) for sysid, state in desk.vehicles.items() if state.place is not None]
+    if desk.trails is None or not seen:
+        return [], np.zeros((0, 3))
+    sysids = [sysid for sysid, _ in seen]
+    geodetic = np.array([(p.latitude_deg, p.longitude_deg, p.altitude_amsl_m) for _, p in seen if p is not None]).T
+    parts = [desk.part(sysid) for sysid in sysids]
+    offsets_m = np.array([part.monitor.ground_offset_m if part is not None else 0.0 for part in parts])
+    return sysids, desk.trails.frame.enu(geodetic[0], geodetic[1], geodetic[2] - offsets_m)
 
 
 def _along(part: VehicleFlight, place_m: Array) -> tuple[float, float, float]:

@@ -1,6 +1,6 @@
 """The book of orders: each is pending until it was accepted, refused or has failed."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
@@ -55,24 +55,24 @@ class OrderBook:
 
     on_change: Callable[[Order], None]
     orders: deque[Order] = field(default_factory=lambda: deque(maxlen=KEPT))
+    _pending: Counter[tuple[Intent, int | None]] = field(default_factory=Counter)
 
     def enter(self, order: Order) -> Order:
         """Take down a new order."""
         self.orders.append(order)
+        self._pending[order.intent, order.sysid] += 1
         self.on_change(order)
         return order
 
     def close(self, order: Order, state: OrderState, reason: str = "") -> None:
         """Take down how an order has ended."""
         order.state, order.reason = state, reason
+        self._pending[order.intent, order.sysid] -= 1
         self.on_change(order)
 
     def pending(self, intent: Intent, sysid: int | None) -> bool:
         """Whether the same order is under way already."""
-        return any(
-            order.state is OrderState.PENDING and (order.intent, order.sysid) == (intent, sysid)
-            for order in self.orders
-        )
+        return self._pending[intent, sysid] > 0
 
 
 def outcome_of(problem: Exception) -> OrderState:

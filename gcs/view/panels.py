@@ -1,5 +1,6 @@
 """The page's panels: what the operator reads and presses, and where it stands."""
 
+import math
 from collections.abc import Callable
 from importlib.resources import files
 
@@ -18,6 +19,8 @@ from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
 
 PANEL_PX, FLEET_PX, EDGE_PX = 330, 1000, 14
 SEVERAL = "Several ..."
+READINESS_INTERVAL_S = 1.0
+"""All checks of a large fleet take a while."""
 
 Press = Callable[[viser.GuiEvent], None]
 
@@ -43,6 +46,7 @@ class Panels:
         self.presses = Presses(desk, lambda: self.selected)
         self._commands = CommandPanel(server.gui, desk, self.presses, on_go_to)
         self._choices: dict[str, list[int]] = {"All (0)": []}
+        self._readiness_s = -math.inf
         server.gui.main_panel.dock_left()
         server.gui.main_panel.set_width(PANEL_PX)
         self._style()
@@ -93,7 +97,8 @@ class Panels:
         by_name = {names[sysid]: colour for sysid, colour in vehicle_colours(names).items()}
         self._events.content = event_list.render(desk.events.events, by_name)
         self._orders.content = order_list.render(desk.orders.orders)
-        self._readiness.content = readiness_list.render(desk, now_s)
+        if abs(now_s - self._readiness_s) > READINESS_INTERVAL_S:
+            self._readiness_s, self._readiness.content = now_s, readiness_list.render(desk, now_s)
         if desk.flight is not None:
             self._plans.content = plan_table.render(desk.flight.candidates, desk.flight.plan)
 

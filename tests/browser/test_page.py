@@ -37,7 +37,7 @@ async def test_the_page_shows_mission_fleet_and_log_and_says_why_buttons_are_off
     await expect(page.locator(".gcs-fleet tbody tr")).to_have_count(2)
     await expect(row(page, "alpha")).to_contain_text("Hold")
     await expect(row(page, "bravo")).to_contain_text("96 %")
-    await expect(page.locator(".gcs-events li").first).to_contain_text("alpha autopilot heard")
+    await expect(page.locator(".gcs-events li", has_text="alpha autopilot heard")).to_have_count(1)
     for name in ("Plan", "Fly"):
         await expect(button(page, name)).to_be_enabled()
     for name in ("Upload", "Hold", "Resume", "RTL", "Land"):
@@ -99,8 +99,8 @@ async def test_what_comes_from_outside_is_shown_as_text_and_a_reload_keeps_every
     scripted.events.add("failed", "<b>not bold</b>", "bravo", Severity.WARNING)
     log = page.locator(".gcs-events")
     for _ in range(2):
-        await expect(log.locator("li.bad")).to_contain_text("<img src=x onerror=alert(1)>")
-        await expect(log.locator("li.warn")).to_contain_text("<b>not bold</b>")
+        await expect(log.locator("li.bad", has_text="<img src=x onerror=alert(1)>")).to_have_count(1)
+        await expect(log.locator("li.warn", has_text="<b>not bold</b>")).to_have_count(1)
         await expect(log.locator("img")).to_have_count(0)
         await expect(page.locator(".gcs-head h1")).to_have_text("indoor")
         await expect(row(page, "alpha")).to_contain_text("Offboard")
