@@ -14,7 +14,7 @@ from gcs.view.colours import BRAND, CAUTION, QUIET, Rgb
 from gcs.view.confirmation import HoldToConfirm
 from gcs.view.presses import Presses, tell
 from missions.errors import MissionError
-from missions.mission import load_mission, shipped_missions
+from missions.mission import Mission, load_mission, shipped_missions
 
 GO: Rgb = (30, 150, 92)
 DANGER: Rgb = (170, 40, 44)
@@ -63,6 +63,10 @@ class CommandPanel:
         self._on_go_to = on_go_to
         self._buttons: dict[Intent, viser.GuiButtonHandle] = {}
         self._kill = HoldToConfirm()
+
+    def suit(self, mission: Mission) -> None:
+        """Offer the heights and speeds of another mission."""
+        self.height_m.value, self._speed.value = mission.takeoff_height_m, mission.limits.cruise_speed_m_s
 
     def update(self, selected: list[int]) -> list[tuple[str, str]]:
         """Bring buttons up to date; (button, reason) of all that cannot be pressed."""
@@ -119,7 +123,7 @@ class CommandPanel:
             hint="height above the ground [m] of the place that is pointed at",
         )  # fmt: skip
         self._speed = self._gui.add_number(
-            "Speed", cruise_m_s, min=0.1, max=30.0, step=0.1, hint="of the autopilot's own flight [m/s]"
+            "Speed", 3.0, min=0.1, max=30.0, step=0.1, hint="of the autopilot's own flight [m/s]"
         )
         self._add(Intent.SPEED, lambda event: self._ask(Intent.SPEED, event, Details(speed_m_s=self._speed.value)))
         self._add_kill()

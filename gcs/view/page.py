@@ -73,6 +73,8 @@ class Page:
             lambda: self._panels.go_to_height_m,
         )
         self._seating = Seating(server, desk.seat)
+        if desk.mission is not None:
+            self._panels.suit(desk.mission)
         self._replay = ReplayPanel(server.gui, desk.player) if desk.player is not None else None
         self._browsers = Browsers(server, self._greet)
         self._use(DARK)
@@ -111,6 +113,8 @@ class Page:
         self._draw_scene()
         self._use(theme)
         self._browsers.explain(self._legend())
+        if self._mission is not None:
+            self._panels.suit(self._mission)
         for client in self._server.get_clients().values():
             client.camera.far = self._server.initial_camera.far
             self._cameras.overview(client)

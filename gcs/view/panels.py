@@ -16,6 +16,7 @@ from gcs.view.link_panel import LinkPanel
 from gcs.view.plots_panel import PlotsPanel
 from gcs.view.presses import Presses, visitor_key
 from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
+from missions.mission import Mission
 
 PANEL_PX, FLEET_PX, EDGE_PX = 330, 1000, 14
 SEVERAL = "Several ..."
@@ -81,6 +82,10 @@ class Panels:
     def go_to_height_m(self) -> float:
         """Above the ground of the place that vehicles are sent to."""
         return self._commands.height_m.value
+
+    def suit(self, mission: Mission) -> None:
+        """Suit another mission."""
+        self._commands.suit(mission)
 
     def update(self, seen: list[Sighting], now_s: float) -> None:
         """Bring everything up to date; viser sends only what has changed."""

@@ -7,6 +7,7 @@ import pytest
 from playwright.async_api import Browser, Locator, Page, expect
 
 from gcs.dialect import Mode, mavlink
+from gcs.flight.monitor import Phase
 from tests.browser.conftest import LARGE, OpenPage, serving, tab
 from tests.browser.ground_station import gcs_fly
 from tests.browser.loopback import HOST, answering, free_port
@@ -39,8 +40,7 @@ async def step_by_step(page: Page) -> None:
     await expect(phase(page)).to_have_text("Planned", timeout=FLIGHT_TIMEOUT_MS)
     await press(page, "Upload")
     await expect(phase(page)).to_have_text("Ready to fly", timeout=FLIGHT_TIMEOUT_MS)
-    await press(page, "Arm")
-    await press(page, "Take off")
+    await press(page, "Take off")  # it arms first: at many times the speed an operator's Arm is over too soon
     await press(page, "Start")
     await expect(phase(page)).to_have_text("Flying", timeout=FLIGHT_TIMEOUT_MS)
 
@@ -78,7 +78,7 @@ async def test_the_indoor_mission_is_loaded_planned_and_flown_from_the_page_alon
 @pytest.mark.processes
 async def test_the_first_terrain_is_flown_by_the_cloud_from_the_page_alone(browser: Browser, tmp_path: Path):
     port = free_port()
-    options = ["--sim", "--wait", "--speed", "10", "--port", str(port), "--instance-base", str(INSTANCE_BASE + 20)]
+    options = ["--sim", "--wait", "--speed", "5", "--port", str(port), "--instance-base", str(INSTANCE_BASE + 20)]
     async with gcs_fly("terrain-1-5uav", *options, "--report", str(tmp_path)):
         await answering(port)
         async with tab(browser, port, LARGE) as page:
@@ -120,6 +120,23 @@ async def test_orders_in_flight_reach_the_vehicles_and_tell_how_they_went(open_p
     await press(page, "Land")
     await until(lambda: all(vehicle.mode is Mode.LAND for vehicle in scripted.vehicles), "both land")
     await expect(orders(page).first).to_contain_text("Land")
+
+
+async def test_a_vehicle_is_armed_once_nothing_speaks_against_it(open_page: OpenPage):
+    scripted = ScriptedDesk("indoor")
+    await scripted.begin()
+    assert scripted.desk.flight is not None
+    await scripted.desk.flight.make_plan()
+    page = await open_page(scripted, LARGE)
+    await expect(page.locator(".gcs-reasons")).to_contain_text("Arm, Take off nothing is uploaded yet")
+    for part in scripted.desk.flight.vehicles.values():
+        part.monitor.phase = Phase.PREPARED
+    await choose(page, "Orders to", "bravo")
+    await press(page, "Arm")
+    await until(lambda: scripted.vehicles[1].armed, "bravo is armed")
+    await expect(page.locator(".gcs-reasons")).to_contain_text("Arm already armed")
+    await expect(button(page, "Take off")).to_be_enabled()
+    assert not scripted.vehicles[0].armed
 
 
 async def test_vehicles_are_sent_to_where_the_operator_clicks(open_page: OpenPage):
