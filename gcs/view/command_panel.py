@@ -117,11 +117,9 @@ class CommandPanel:
         self._add(Intent.GO_TO, lambda event: self._on_go_to(event.client) if event.client else None)
         if desk.flight is not None:
             self._add(Intent.REPLAN)
-        cruise_m_s = desk.mission.limits.cruise_speed_m_s if desk.mission is not None else 3.0
         self.height_m = self._gui.add_number(
-            "Go to at", desk.mission.takeoff_height_m if desk.mission else 5.0, min=0.5, max=1000.0, step=0.5,
-            hint="height above the ground [m] of the place that is pointed at",
-        )  # fmt: skip
+            "Go to at", 5.0, min=0.5, max=1000.0, step=0.5, hint="height above the ground [m] of the place"
+        )
         self._speed = self._gui.add_number(
             "Speed", 3.0, min=0.1, max=30.0, step=0.1, hint="of the autopilot's own flight [m/s]"
         )
