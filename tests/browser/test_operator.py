@@ -6,8 +6,11 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, Locator, Page, expect
 
+from gcs.desk.intents import NewMission
 from gcs.dialect import Mode, mavlink
 from gcs.flight.monitor import Phase
+from gcs.settings import PlanningMode
+from missions.mission import SHIPPED
 from tests.browser.conftest import LARGE, OpenPage, serving, tab
 from tests.browser.ground_station import gcs_fly
 from tests.browser.loopback import HOST, answering, free_port
@@ -45,9 +48,13 @@ async def step_by_step(page: Page) -> None:
     await expect(phase(page)).to_have_text("Flying", timeout=FLIGHT_TIMEOUT_MS)
 
 
-async def load(page: Page, mission: str) -> None:
+async def load_by_list(page: Page, mission: str) -> None:
     await choose(page, "Mission", mission)
     await press(page, "Load")
+
+
+async def load(page: Page, mission: str) -> None:
+    await load_by_list(page, mission)
     await expect(page.locator(".gcs-head h1")).to_have_text(mission)
 
 
@@ -76,9 +83,11 @@ async def test_the_indoor_mission_is_loaded_planned_and_flown_from_the_page_alon
 
 
 @pytest.mark.processes
+@pytest.mark.slow
+@pytest.mark.timeout(600)
 async def test_the_first_terrain_is_flown_by_the_cloud_from_the_page_alone(browser: Browser, tmp_path: Path):
     port = free_port()
-    options = ["--sim", "--wait", "--speed", "5", "--port", str(port), "--instance-base", str(INSTANCE_BASE + 20)]
+    options = ["--sim", "--wait", "--speed", "10", "--port", str(port), "--instance-base", str(INSTANCE_BASE + 20)]
     async with gcs_fly("terrain-1-5uav", *options, "--report", str(tmp_path)):
         await answering(port)
         async with tab(browser, port, LARGE) as page:
@@ -86,10 +95,36 @@ async def test_the_first_terrain_is_flown_by_the_cloud_from_the_page_alone(brows
             await expect(page.locator(".gcs-head small")).to_contain_text("cloud", timeout=FLIGHT_TIMEOUT_MS)
             await step_by_step(page)
             await page.screenshot(path=OUT / "operator-terrain.png")
-            await expect(phase(page)).to_have_text("Mission accomplished", timeout=FLIGHT_TIMEOUT_MS)
+            await expect(phase(page)).to_have_text("Mission accomplished", timeout=2 * FLIGHT_TIMEOUT_MS)
     report = json.loads((tmp_path / "flight-2" / "report.json").read_text())
     assert (report["mission"], report["mode"]) == ("terrain-1-5uav", "cloud")
     assert report["success"], report["reason"]
+
+
+# ---------------------------------------------------------------- missions
+
+
+async def test_missions_are_loaded_from_the_list_and_from_files(open_page: OpenPage, tmp_path: Path):
+    scripted, opened = ScriptedDesk("indoor"), list[NewMission]()
+
+    async def opener(new: NewMission | None, mode: PlanningMode | None) -> None:
+        assert new is not None
+        opened.append(new)
+
+    scripted.desk.opener = opener
+    page = await open_page(scripted, LARGE)
+    await load_by_list(page, "fleet-10")
+    await until(lambda: len(opened) == 1, "the first one is opened")
+    broken, whole = tmp_path / "broken.yaml", tmp_path / "field.yaml"
+    broken.write_text("name: broken")
+    whole.write_bytes((SHIPPED / "field.yaml").read_bytes())
+    files = page.locator('input[type="file"]')
+    await files.set_input_files(broken)
+    await expect(page.get_by_text("broken.yaml was not loaded")).to_be_visible()
+    await files.set_input_files(whole)
+    await until(lambda: len(opened) == 2, "the file is opened")
+    assert [new.mission.name for new in opened] == ["fleet-10", "field"]
+    assert opened[1].content == whole.read_bytes()
 
 
 # ---------------------------------------------------------------- single orders
