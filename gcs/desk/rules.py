@@ -40,6 +40,8 @@ def why_not_flight(desk: "Desk", intent: Intent) -> str | None:
         return _why_not_replan(flight)
     if desk.running is not None:
         return f"{desk.running.value} is under way"
+    if desk.orders.pending(intent, None):
+        return f"{intent.value} is under way"
     if flight.in_flight:
         return IN_FLIGHT
     if intent is Intent.LOAD:

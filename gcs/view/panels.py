@@ -20,8 +20,8 @@ from missions.mission import Mission
 
 PANEL_PX, FLEET_PX, EDGE_PX = 330, 1000, 14
 SEVERAL = "Several ..."
-READINESS_INTERVAL_S = 1.0
-"""All checks of a large fleet take a while."""
+LOOKED_UP_INTERVAL_S = 1.0
+"""What stands behind other tabs takes a while for a large fleet."""
 
 Press = Callable[[viser.GuiEvent], None]
 
@@ -47,7 +47,7 @@ class Panels:
         self.presses = Presses(desk, lambda: self.selected)
         self._commands = CommandPanel(server.gui, desk, self.presses, on_go_to)
         self._choices: dict[str, list[int]] = {"All (0)": []}
-        self._readiness_s = -math.inf
+        self._looked_up_s = -math.inf
         server.gui.main_panel.dock_left()
         server.gui.main_panel.set_width(PANEL_PX)
         self._style()
@@ -96,14 +96,20 @@ class Panels:
         self._take_command.visible = len(desk.seat.present) > 1 or desk.seat.holder is None
         self._reasons.content = mission_card.render_reasons(self._commands.update(sorted(self.selected)))
         self._fleet.content = fleet_table.render(fleet_table.rows(desk, seen, self.picked_out, now_s))
-        self._links.update(now_s)
         self._plots.update(sorted(self.picked_out), now_s)
         names = vehicle_names(desk)
         by_name = {names[sysid]: colour for sysid, colour in vehicle_colours(names).items()}
         self._events.content = event_list.render(desk.events.events, by_name)
         self._orders.content = order_list.render(desk.orders.orders)
-        if abs(now_s - self._readiness_s) > READINESS_INTERVAL_S:
-            self._readiness_s, self._readiness.content = now_s, readiness_list.render(desk, now_s)
+        if abs(now_s - self._looked_up_s) > LOOKED_UP_INTERVAL_S:
+            self._looked_up_s = now_s
+            self._look_up(now_s)
+
+    def _look_up(self, now_s: float) -> None:
+        """What is behind other tabs."""
+        desk = self._desk
+        self._links.update(now_s)
+        self._readiness.content = readiness_list.render(desk, now_s)
         if desk.flight is not None:
             self._plans.content = plan_table.render(desk.flight.candidates, desk.flight.plan)
 

@@ -2,7 +2,7 @@
 
 import asyncio
 import functools
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -109,6 +109,8 @@ class WholeSystem:
     """(time [s], positions (n, 3), velocities (n, 3)) of every tick."""
 
     faults: tuple[Fault, ...] = ()
+    operate: Callable[[FleetFlight], Awaitable[None]] = FleetFlight.fly
+    """Who lets it fly, from the connection to the end."""
     truth_mission: Mission | None = None
 
     def __post_init__(self) -> None:
@@ -138,7 +140,7 @@ class WholeSystem:
             if self.mode.needs_companions:
                 background += [group.create_task(self._companion(vehicle)) for vehicle in self.mission.vehicles]
             try:
-                await self.flight.fly()
+                await self.operate(self.flight)
             except GcsError as problem:
                 self.error = problem
             for task in background:
