@@ -10,6 +10,8 @@ Layers, each importing only what stands below it:
     station         all vehicles on all links: routes messages to services and state
     microservices   sans-IO MAVLink services (commands, missions, parameters)
     link, fleet     datagrams and recordings; telemetry folded into state
+    replanning      when the cloud plans anew in flight, what for, and whether the answer is flown
     planner         E-CPSO, target allocation, the plan's judge
+    mapping         what all vehicles have seen, in one map
     dialect         pymavlink as codec
 """

@@ -14,8 +14,9 @@ from gcs.errors import GcsError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.picture import draw_flight
 from gcs.flight.preflight import origin_here
+from gcs.flight.preparation import CONNECT_TIMEOUT_S
 from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
-from gcs.flight.sequence import CONNECT_TIMEOUT_S, FleetFlight, Planner
+from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
 from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp

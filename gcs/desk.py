@@ -16,8 +16,9 @@ from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.monitor import Phase
-from gcs.flight.sequence import FleetFlight, VehicleFlight
+from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trails
+from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.command_client import CommandClient
 from gcs.planner.plan import Progress
 from gcs.station import Station
@@ -166,10 +167,10 @@ class Desk:
             await self.station.run(CommandClient(actions.set_mode(mode), (sysid, AUTOPILOT)))
             return
         orders = {
-            Intent.HOLD: self.flight.hold,
-            Intent.RESUME: self.flight.resume,
-            Intent.RTL: self.flight.return_home,
-            Intent.LAND: self.flight.land,
+            Intent.HOLD: self.flight.orders.hold,
+            Intent.RESUME: self.flight.orders.start,
+            Intent.RTL: self.flight.orders.return_home,
+            Intent.LAND: self.flight.orders.land,
         }
         await orders[intent](part)
 

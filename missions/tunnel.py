@@ -23,6 +23,8 @@ class PayloadType(IntEnum):
 
     TRAJECTORY = 0x8051
     COMPANION_STATUS = 0x8052
+    OCCUPANCY = 0x8053
+    """Its codec is `missions.occupancy`."""
 
 
 class TrajectoryKind(IntEnum):

@@ -2,8 +2,12 @@
 
 from dataclasses import dataclass, field
 
-from gcs.dialect import GCS_SYSTEM, Message, mavlink
+from gcs.dialect import COMPANION, GCS_SYSTEM, Message, mavlink
 from gcs.fleet.vehicle_state import VehicleState
+from gcs.mapping.observed_map import ObservedMap
+from missions.errors import WireFormatError
+from missions.occupancy import decode_block
+from missions.tunnel import PayloadType
 
 MAX_VEHICLES = 250
 
@@ -13,6 +17,8 @@ class Fleet:
     """The vehicles that were heard; a vehicle exists from its autopilot's first heartbeat on."""
 
     vehicles: dict[int, VehicleState] = field(default_factory=dict)
+    observed: ObservedMap = field(default_factory=ObservedMap)
+    """What their companions have seen."""
 
     def fold(self, message: Message, now_s: float) -> None:
         """Take in one message from any system."""
@@ -23,6 +29,19 @@ class Fleet:
                 return
             vehicle = self.vehicles[sysid] = VehicleState(sysid)
         vehicle.fold(message, now_s)
+        if _is_occupancy(message):
+            self._observe(vehicle, bytes(message.payload[: message.payload_length]))
+
+    def _observe(self, vehicle: VehicleState, payload: bytes) -> None:
+        try:
+            self.observed.fold(vehicle.sysid, decode_block(payload))
+        except WireFormatError:
+            vehicle.undecodable += 1
+
+
+def _is_occupancy(message: Message) -> bool:
+    is_tunnel = message.get_type() == "TUNNEL" and message.get_srcComponent() == COMPANION
+    return is_tunnel and message.payload_type == PayloadType.OCCUPANCY
 
 
 def _is_autopilot(message: Message) -> bool:

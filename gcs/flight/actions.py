@@ -1,9 +1,14 @@
 """The commands of a flight, built so that a repeated copy changes nothing."""
 
 from gcs.dialect import Mode, mavlink
-from gcs.microservices.command_client import NAN, Command
+from gcs.microservices.command_client import NAN, Command, PlaceCommand
+from missions.frames import GeodeticPoint
 
 CUSTOM_MODE_ENABLED = 1.0
+FORCE = 21196.0
+"""Disarm whatever the vehicle does: in flight it falls."""
+GROUND_SPEED, SAME_THROTTLE = 1.0, -1.0
+SAME_SPEED = -1.0
 
 
 def arm() -> Command:
@@ -13,6 +18,23 @@ def arm() -> Command:
 def disarm() -> Command:
     """Refused by the autopilot while it flies."""
     return Command("disarm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (0.0,))
+
+
+def kill() -> Command:
+    """Stop the motors at once."""
+    return Command("kill", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (0.0, FORCE))
+
+
+def go_to(place: GeodeticPoint) -> Command:
+    """Fly straight to a place, its altitude AMSL, and hold there."""
+    params = (SAME_SPEED, float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE), 0.0, NAN)
+    return PlaceCommand("go to", mavlink.MAV_CMD_DO_REPOSITION, params, place)
+
+
+def change_speed(speed_m_s: float) -> Command:
+    """Ground speed of the autopilot's own flight from now on."""
+    params = (GROUND_SPEED, speed_m_s, SAME_THROTTLE)
+    return Command(f"speed {speed_m_s:g} m/s", mavlink.MAV_CMD_DO_CHANGE_SPEED, params)
 
 
 def take_off(altitude_amsl_m: float) -> Command:

@@ -4,13 +4,14 @@ Sans-IO: `VehicleMonitor.step` is given the vehicle's state and the time, and re
 The companion's own status is believed while its heartbeat is fresh; without it the autopilot's mode decides.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
 
 from gcs.dialect import Mode
 from gcs.fleet.vehicle_state import LandedState, VehicleState
+from gcs.flight.route import RouteWatch
 from missions.frames import LocalFrame
 from missions.mission import OnArrival, Target
 from missions.tunnel import CompanionState, Reason
@@ -47,6 +48,9 @@ class Phase(Enum):
         return self in {Phase.TAKING_OFF, Phase.HOVERING, Phase.FLYING, Phase.INTERRUPTED, Phase.COMING_DOWN}
 
 
+CAN_COME_DOWN = {Phase.HOVERING, Phase.FLYING, Phase.INTERRUPTED, Phase.COMING_DOWN}
+
+
 @dataclass
 class VehicleMonitor:
     """One vehicle's flight from the start of its mission on.
@@ -59,6 +63,7 @@ class VehicleMonitor:
         flown_by_companion: False in cloud mode, where the autopilot flies the mission itself.
         unattended: nobody is there to resume an interrupted flight, so it is ended by landing.
         speed: simulated seconds per wall-clock second.
+        route: the targets on the way.
     """
 
     target: Target
@@ -70,6 +75,7 @@ class VehicleMonitor:
     frame: LocalFrame
     ground_offset_m: float
     speed: float = 1.0
+    route: RouteWatch = field(default_factory=lambda: RouteWatch((), 0.0))
     phase: Phase = Phase.WAITING
     reached: bool = False
     reason: str = ""
@@ -90,7 +96,7 @@ class VehicleMonitor:
 
     def step(self, state: VehicleState, now_s: float) -> Mode | None:
         """Look at the vehicle; the mode that the ground has to command now, or None."""
-        if self.phase in {Phase.FLYING, Phase.INTERRUPTED, Phase.COMING_DOWN} and self._down(state):
+        if self.phase in CAN_COME_DOWN and self._down(state):
             return self._finish(state)
         match self.phase:
             case Phase.FLYING:
@@ -121,8 +127,11 @@ class VehicleMonitor:
             self.come_down(f"not at its target after {self.endurance_s:g} s, its endurance")
             return Mode.LAND
         self._was_at_target = self._was_at_target or self.distance_to_target_m(state) <= self.tolerance_m
+        position_m = state.position_m(self.frame, self.ground_offset_m)
+        if position_m is not None:
+            self.route.see(position_m, state.boot_time_s, state.mission_seq)
         if self._holds_at_target(state):
-            self.reached, self.phase, self.reason = True, Phase.DONE, "holding at its target"
+            self._arrive("holding at its target")
             return None
         return self._companion_flight(state, now_s) if self.flown_by_companion else self._cloud_flight(state, now_s)
 
@@ -174,11 +183,20 @@ class VehicleMonitor:
     def _finish(self, state: VehicleState) -> None:
         missed_m = self.distance_to_target_m(state, horizontal=True)
         at_home = self.on_arrival is OnArrival.RTL and self._was_at_target
-        self.reached = self.phase is Phase.FLYING and (missed_m <= self.tolerance_m or at_home)
-        if self.phase is Phase.FLYING and not self.reached:
+        if self.phase is Phase.FLYING and (missed_m <= self.tolerance_m or at_home):
+            self._arrive("landed at its target")
+            return
+        if self.phase is Phase.FLYING:
             self.reason = f"landed {missed_m:.1f} m from its target"
-        self.phase = Phase.DONE
-        self.reason = self.reason or ("landed at its target" if self.reached else "landed")
+        if self.phase is Phase.HOVERING:
+            self.reason = "landed before its mission began"
+        self.phase, self.reason = Phase.DONE, self.reason or "landed"
+
+    def _arrive(self, how: str) -> None:
+        """It is at its last target; it has reached its goal if it came to all those on the way, too."""
+        missed = self.route.missed
+        self.phase, self.reached = Phase.DONE, not missed
+        self.reason = how if not missed else f"{how}, but never came to {', '.join(missed)}"
 
 
 def describe(state: CompanionState, reason: Reason) -> str:

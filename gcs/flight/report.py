@@ -3,14 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from gcs.dialect import AUTOPILOT
-from gcs.flight.sequence import FleetFlight, VehicleFlight
+from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trail
+from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.link.codec import SourceCount
 from missions import obstacles
 from missions.mission import Mission
@@ -131,8 +133,8 @@ def make_report(
         sim_s=round(sim_s, 2),
         speed=flight.speed,
         min_separation_m=_rounded(min_separation_m(list(flown.values()))),
-        cloud_replans=0,
-        swap_s_p50=None,
+        cloud_replans=flight.cloud.replans,
+        swap_s_p50=_rounded(median(flight.cloud.swaps_s)) if flight.cloud.swaps_s else None,
         vehicles=vehicles,
     )
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from gcs.dialect import Message, enum_name, mavlink
 from gcs.errors import CommandRefused, LinkLost
 from gcs.microservices import Backoff
+from missions.frames import GeodeticPoint
+from missions.mission_items import DEG_E7
 
 FIRST_TIMEOUT_S = 0.5
 ATTEMPTS = 10
@@ -29,6 +31,23 @@ class Command:
     def message(self, peer: tuple[int, int], confirmation: int) -> Message:
         params = (*self.params, *(0.0,) * (7 - len(self.params)))
         return mavlink.MAVLink_command_long_message(*peer, self.number, confirmation, *params)
+
+
+@dataclass(frozen=True)
+class PlaceCommand(Command):
+    """One COMMAND_INT: parameters 1 to 4, and a place that a float32 could not carry; its altitude is AMSL."""
+
+    place: GeodeticPoint | None = None
+
+    def message(self, peer: tuple[int, int], confirmation: int) -> Message:
+        assert self.place is not None
+        one, two, three, four = (*self.params, *(0.0,) * (4 - len(self.params)))
+        x, y = round(self.place.latitude_deg * DEG_E7), round(self.place.longitude_deg * DEG_E7)
+        frame, z_m = mavlink.MAV_FRAME_GLOBAL, self.place.altitude_amsl_m
+        system, component = peer
+        return mavlink.MAVLink_command_int_message(
+            system, component, frame, self.number, 0, 0, one, two, three, four, x, y, z_m
+        )
 
 
 @dataclass

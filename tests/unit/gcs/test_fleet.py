@@ -10,6 +10,7 @@ from gcs.fleet.fleet import Fleet
 from gcs.fleet.vehicle_state import LandedState, VehicleState
 from missions import tunnel
 from missions.mission import load_mission
+from missions.occupancy import OccupancyBlock, encode_block
 from missions.trajectory import Trajectory
 from missions.tunnel import CompanionState, TrajectoryKind, TrajectoryMessage
 from tests.unit.gcs import messages as mav
@@ -113,3 +114,19 @@ def test_a_broadcast_of_the_forwarded_gcs_is_no_vehicle():
     heartbeat = mav.sent_by(255, 190, mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
     fleet.fold(heartbeat, 0.0)
     assert fleet.vehicles == {}
+
+
+def test_what_companions_have_seen_becomes_one_map_of_the_fleet():
+    fleet = Fleet()
+    for sysid in (1, 2):
+        fleet.fold(mav.heartbeat(sysid=sysid), 0.0)
+        occupied = np.zeros((8, 8, 8), np.bool_)
+        occupied[sysid, 0, 0] = True
+        payload = encode_block(OccupancyBlock((0, 0, 0), 0.2, 1, occupied))
+        fleet.fold(mav.tunnel_message(tunnel.PayloadType.OCCUPANCY, payload, sysid), 0.0)
+    assert fleet.observed.voxels.tolist() == [[1, 0, 0], [2, 0, 0]]
+
+
+def test_a_block_that_is_none_is_counted():
+    state = state_after(mav.tunnel_message(tunnel.PayloadType.OCCUPANCY, b"\x07" * 20))
+    assert state.undecodable == 1

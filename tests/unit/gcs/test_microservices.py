@@ -11,6 +11,7 @@ from gcs.flight import actions
 from gcs.microservices.command_client import ATTEMPTS, PROGRESS_TIMEOUT_S, CommandClient
 from gcs.microservices.mission_transfer_client import MissionDownload, MissionUpload, item_message
 from gcs.microservices.parameter_client import ParameterExchange
+from missions.frames import GeodeticPoint
 from missions.mission_items import MissionItem
 from tests.unit.gcs.messages import command_ack, from_autopilot
 
@@ -271,3 +272,13 @@ def test_an_absurd_count_is_refused():
     download.start(0.0)
     with pytest.raises(MissionTransferError, match="65535 items"):
         download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 65535, 0)), 0.1)
+
+
+def test_a_place_travels_as_integers_and_its_altitude_amsl():
+    place = GeodeticPoint(latitude_deg=47.3977432, longitude_deg=8.5455942, altitude_amsl_m=491.5)
+    (message,) = CommandClient(actions.go_to(place), PEER).start(0.0)
+    assert message.get_type() == "COMMAND_INT"
+    assert (message.command, message.x, message.y) == (mavlink.MAV_CMD_DO_REPOSITION, 473977432, 85455942)
+    assert (message.frame, message.z, message.param1) == (mavlink.MAV_FRAME_GLOBAL, 491.5, -1.0)
+    assert int(message.param2) == mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
+    assert math.isnan(message.param4)

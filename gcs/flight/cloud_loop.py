@@ -1,0 +1,200 @@
+"""The cloud's half of the loop in flight: looks at what was seen, plans anew, and swaps missions without a pause.
+
+The decisions are `gcs.replanning`'s; here they meet the planner and the links. A swap is an upload that is read back,
+and then the companion's word that it flies the new plan; the companion names the current item.
+"""
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gcs.errors import GcsError, LinkLost
+from gcs.flight import upload
+from gcs.flight.events import Severity
+from gcs.flight.monitor import Phase
+from gcs.flight.preparation import mission_items
+from gcs.flight.vehicle_flight import VehicleFlight
+from gcs.planner.curves import lengths
+from gcs.planner.plan import FleetPlan, VehiclePlan
+from gcs.replanning.remaining import Aloft, remaining_mission
+from gcs.replanning.replanner import Cause, Replanner
+from gcs.settings import PlanningMode
+from missions.errors import MissionError
+from missions.mission import Mission
+from missions.mission_items import plan_id
+from missions.tunnel import CompanionState, Reason
+from missions.world import Box
+
+if TYPE_CHECKING:
+    from gcs.flight.sequence import FleetFlight
+
+LOOK_INTERVAL_S = 0.05
+"""In vehicle time, as all that follows."""
+SWAP_TIMEOUT_S = 5.0
+"""A companion that has the new mission for so long and does not fly it is said so."""
+ARRIVING_M = 1.5
+"""Who is so near to its last target is not sent anywhere else, in units of its arrival tolerance and more."""
+SAME_WAY_SHARE = 0.25
+"""A vehicle whose new curve stays within this share of the clearance of its old one keeps what it has."""
+
+
+@dataclass
+class CloudLoop:
+    """Replans one flight while it flies.
+
+    Args:
+        flight: whose plan it keeps good.
+    """
+
+    flight: "FleetFlight"
+    replans: int = 0
+    """Plans that were made in flight and flown."""
+    swaps_s: list[float] = field(default_factory=list)
+    """From the moment a cause was noticed to the companion's word that it flies the new plan; vehicle time."""
+
+    def __post_init__(self) -> None:
+        observed = self.flight.station.fleet.observed
+        observed.bounds = self.flight.mission.world.bounds
+        self.replanner = Replanner(self.flight.mission, observed)
+        self._progress: dict[int, int] = {}
+
+    def edit(self, mission: Mission) -> None:
+        """Fly a changed mission: other obstacles, targets, or fewer vehicles."""
+        self.flight.mission = mission
+        self.replanner.edit(mission)
+
+    async def run(self) -> None:
+        """Look, and plan anew when there is a cause; until it is cancelled. Where one side plans alone, do nothing."""
+        if self.flight.mode is not PlanningMode.END_CLOUD:
+            return
+        self.replanner.mission = self.flight.mission  # its origin may have moved since
+        while True:
+            aloft = list(self._aloft())
+            cause = self.replanner.look(aloft, self._now_s)
+            if cause is not None:
+                await self._replan(cause, aloft)
+            await asyncio.sleep(LOOK_INTERVAL_S / self.flight.speed)
+
+    @property
+    def _now_s(self) -> float:
+        return self.flight.station.now_s * self.flight.speed
+
+    async def _replan(self, cause: Cause, aloft: Sequence[Aloft]) -> None:
+        flight, began_s, observed = self.flight, self._now_s, self.replanner.observed
+        changes = observed.changes
+        flight.events.add("replan", f"planning anew: {cause.value}", cause=cause.name.lower())
+        rest = remaining_mission(flight.mission, aloft, (*observed.boxes(), *self._parked(aloft)))
+        try:
+            plan = await flight.planner(rest)
+        except MissionError as problem:
+            flight.events.add("replan", f"no plan: {problem}", severity=Severity.WARNING)
+            self.replanner.put_off(self._now_s)
+            return
+        kept = self.replanner.judge(cause, plan, aloft, changes, self._now_s)
+        if kept:
+            flight.events.add("replan", f"the plan stays: {kept}", cause=cause.name.lower())
+            return
+        self.replans += 1
+        text = f"new plan after {self._now_s - began_s:.2f} s for {len(plan.vehicles)} vehicles"
+        flight.events.add("replanned", text, objective=plan.objective, cause=cause.name.lower())
+        await self._hand_out(plan, aloft, began_s)
+
+    async def _hand_out(self, plan: FleetPlan, aloft: Sequence[Aloft], began_s: float) -> None:
+        """Swap the missions of all vehicles whose way changes, all at once."""
+        left = {vehicle.sysid: vehicle for vehicle in aloft}
+        changed = [part for part in plan.vehicles if self._goes_elsewhere(part, left[part.sysid])]
+        outcomes = await asyncio.gather(*(self._swap(part, began_s) for part in changed))
+        if not all(outcomes):
+            self.replanner.forget_plan()
+
+    def _goes_elsewhere(self, part: VehiclePlan, left: Aloft) -> bool:
+        limit_m = SAME_WAY_SHARE * self.flight.mission.limits.clearance_m
+        return (
+            part.targets != left.targets
+            or max(float(lengths(left.curve_m - point_m).min()) for point_m in part.curve_m[::4]) > limit_m
+        )
+
+    async def _swap(self, part: VehiclePlan, began_s: float) -> bool:
+        """Give one vehicle its new mission; False where it may still fly the old one."""
+        flight, vehicle = self.flight, self.flight.vehicles[part.sysid]
+        items = mission_items(part, flight.mission, flight.mode, vehicle.monitor.ground_offset_m)
+        try:
+            await upload.store(flight.station, part.sysid, items)
+            await self._confirmed(vehicle, plan_id(items))
+        except GcsError as problem:
+            flight.events.add("swap failed", str(problem), vehicle.name, Severity.WARNING)
+            return False
+        vehicle.change_plan(part)
+        vehicle.take_items(items, flight.mission)
+        self._progress.pop(part.sysid, None)
+        assert flight.plan is not None
+        parts = tuple(part if old.sysid == part.sysid else old for old in flight.plan.vehicles)
+        flight.plan = replace(flight.plan, vehicles=parts)
+        took_s = self._now_s - began_s
+        self.swaps_s.append(took_s)
+        flight.events.add("swapped", f"flies the new plan after {took_s:.2f} s", vehicle.name, plan_id=plan_id(items))
+        return True
+
+    async def _confirmed(self, vehicle: VehicleFlight, expected: int) -> None:
+        companion = self.flight.state(vehicle.sysid).companion
+
+        def flies_it() -> bool:
+            return companion.status is not None and companion.status.plan_id == expected
+
+        if not await self.flight.station.holds_within(flies_it, SWAP_TIMEOUT_S / self.flight.speed):
+            raise LinkLost(f"vehicle {vehicle.sysid} does not say that it flies the new plan")
+
+    # ------------------------------------------------------------------ where the vehicles are
+
+    def _aloft(self) -> Iterator[Aloft]:
+        """The vehicles that can be sent another way."""
+        for vehicle in self.flight.vehicles.values():
+            position_m = self._position_m(vehicle)
+            if position_m is None or vehicle.plan is None or not self._is_under_way(vehicle):
+                continue
+            plan, done = vehicle.plan, self._progressed(vehicle, position_m)
+            targets = tuple(target for target in plan.targets if target.name not in vehicle.monitor.route.passed)
+            curve_m = plan.curve_m[done:]
+            if len(curve_m) > 1 and lengths(plan.curve_m[-1] - position_m) > self._arriving_m:
+                remaining_s = float(plan.times_s[-1] - plan.times_s[done])
+                yield Aloft(vehicle.sysid, position_m, targets, curve_m, remaining_s)
+
+    @property
+    def _arriving_m(self) -> float:
+        return max(ARRIVING_M, self.flight.mission.site.arrival_tolerance_m)
+
+    def _is_under_way(self, vehicle: VehicleFlight) -> bool:
+        status = self.flight.state(vehicle.sysid).companion.status
+        if vehicle.monitor.phase is not Phase.FLYING or status is None:
+            return False
+        return status.state is CompanionState.FLYING or (status.state, status.reason) == (
+            CompanionState.HOLDING,
+            Reason.NO_PATH,
+        )
+
+    def _progressed(self, vehicle: VehicleFlight, position_m: np.ndarray) -> int:
+        """Index of the sample of its curve beside which a vehicle is; it does not go back."""
+        assert vehicle.plan is not None
+        curve_m, before = vehicle.plan.curve_m, self._progress.get(vehicle.sysid, 0)
+        step_m = max(vehicle.plan.length_m / (len(curve_m) - 1), 1e-6)
+        window = 2 + round(2.0 * self.flight.mission.onboard.horizon_m / step_m)
+        done = before + int(np.argmin(lengths(curve_m[before : before + window] - position_m)))
+        self._progress[vehicle.sysid] = done
+        return done
+
+    def _parked(self, aloft: Sequence[Aloft]) -> Iterator[Box]:
+        """Vehicles that are planned for no more, as obstacles that keep the others at the required separation."""
+        limits, moving = self.flight.mission.limits, {vehicle.sysid for vehicle in aloft}
+        half_m = max(limits.separation_m - limits.clearance_m, limits.body_radius_m)
+        for vehicle in self.flight.vehicles.values():
+            position_m = self._position_m(vehicle)
+            if vehicle.sysid not in moving and position_m is not None:
+                east_m, north_m, up_m = position_m.tolist()
+                yield Box(name=vehicle.name, centre_m=(east_m, north_m, up_m), half_m=(half_m, half_m, half_m))
+
+    def _position_m(self, vehicle: VehicleFlight) -> np.ndarray | None:
+        offset_m = vehicle.monitor.ground_offset_m
+        return self.flight.state(vehicle.sysid).position_m(self.flight.mission.frame, offset_m)

@@ -1,0 +1,134 @@
+"""When the cloud plans anew in flight, and whether what it finds is worth a change. Sans-IO."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.mapping.observed_map import ObservedMap
+from gcs.planner.plan import FleetPlan
+from gcs.replanning.remaining import Aloft
+from missions import obstacles
+from missions.mission import Mission
+from missions.world import World
+
+Array = npt.NDArray[np.float64]
+
+
+class Cause(Enum):
+    """Why the cloud plans anew."""
+
+    BLOCKED = "the plan is blocked by what was seen"
+    EDITED = "the operator has changed the mission"
+    REVIEW = "the map has changed since the plan was made"
+
+
+@dataclass(frozen=True)
+class ReplanSettings:
+    """Patience and hysteresis; times are vehicle times.
+
+    Args:
+        interval_s: between two plans that were accepted.
+        retry_s: after a plan that was not feasible.
+        review_s: a plan that is not blocked is looked at again so often, when the map has changed.
+        better_s: by this much sooner must all have arrived for a change to be worth it ...
+        better_share: ... and by this share of what remains.
+    """
+
+    interval_s: float = 0.5
+    retry_s: float = 1.0
+    review_s: float = 5.0
+    better_s: float = 1.0
+    better_share: float = 0.1
+
+
+@dataclass
+class Replanner:
+    """Decides for one flight.
+
+    Args:
+        mission: what is flown; replaced by operator edits.
+        observed: what the fleet has seen.
+        settings: patience and hysteresis.
+    """
+
+    mission: Mission
+    observed: ObservedMap
+    settings: ReplanSettings = ReplanSettings()
+    planned_changes: int = 0
+    """The state of the map that the plan being flown knows."""
+    _not_before_s: float = -np.inf
+    _review_s: float = -np.inf
+    _edited: bool = False
+
+    def __post_init__(self) -> None:
+        self._packed = obstacles.pack(World(bounds=self.mission.world.bounds))
+        self._packed_changes = 0
+
+    def edit(self, mission: Mission) -> None:
+        """The operator has changed what is flown: the next look has a cause."""
+        self.mission, self._edited, self._not_before_s = mission, True, -np.inf
+
+    def look(self, aloft: Sequence[Aloft], now_s: float) -> Cause | None:
+        """Why a new plan is wanted now, or None."""
+        if not aloft or now_s < self._not_before_s:
+            return None
+        if self._edited:
+            return Cause.EDITED
+        if self.observed.changes == self.planned_changes:
+            return None
+        if any(self.is_blocked(vehicle.curve_m) for vehicle in aloft):
+            return Cause.BLOCKED
+        return Cause.REVIEW if now_s >= self._review_s else None
+
+    def is_blocked(self, curve_m: Array) -> bool:
+        """A curve of (m, 3) ENU samples comes too near to what was seen.
+
+        Voxels reach beyond the surface that was hit by up to their own size: so much less clearance is asked for.
+        """
+        if not len(curve_m):
+            return False
+        required_m = max(self.mission.limits.clearance_m - self.observed.voxel_m, self.mission.limits.body_radius_m)
+        return float(obstacles.clearance(curve_m, self._seen()).min()) < required_m
+
+    def judge(self, cause: Cause, plan: FleetPlan, aloft: Sequence[Aloft], changes: int, now_s: float) -> str:
+        """Why a new plan is not flown, as a phrase; empty if it is.
+
+        Args:
+            cause: why it was asked for.
+            plan: for all vehicles in flight.
+            aloft: as it was when it was asked for.
+            changes: `observed.changes` then.
+            now_s: vehicle time.
+        """
+        if not plan.feasible:
+            self.put_off(now_s)
+            return "; ".join(str(violation) for violation in plan.violations)
+        self._not_before_s, self._review_s = now_s + self.settings.interval_s, now_s + self.settings.review_s
+        self.planned_changes = changes  # the plan that is flown from now on, old or new, is good for this map
+        if cause is Cause.REVIEW and not self._materially_better(plan, aloft):
+            return "it is not materially better"
+        self._edited = False
+        return ""
+
+    def put_off(self, now_s: float) -> None:
+        """There was no plan at all: try again later."""
+        self._not_before_s = now_s + self.settings.retry_s
+
+    def forget_plan(self) -> None:
+        """Not every vehicle has got the new plan: what is flown may not know the map, so it is looked at anew."""
+        self.planned_changes = -1
+
+    def _materially_better(self, plan: FleetPlan, aloft: Sequence[Aloft]) -> bool:
+        now_takes_s = max(vehicle.remaining_s for vehicle in aloft)
+        then_takes_s = max(float(part.times_s[-1]) for part in plan.vehicles)
+        saved_s = now_takes_s - then_takes_s
+        return saved_s > max(self.settings.better_s, self.settings.better_share * now_takes_s)
+
+    def _seen(self) -> obstacles.Obstacles:
+        if self._packed_changes != self.observed.changes:
+            self._packed = obstacles.pack(World(bounds=self.mission.world.bounds, boxes=self.observed.boxes()))
+            self._packed_changes = self.observed.changes
+        return self._packed
