@@ -23,9 +23,10 @@ from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
 from gcs.settings import Autopilots, FlightSettings, OriginHere
 from gcs.station import Station
+from missions import lidar_packets
 from missions.errors import MissionError
 from missions.faults import format_fault
-from missions.mission import Mission
+from missions.mission import Mission, SensorKind
 
 TRAIL_INTERVAL_S = 0.05
 HOLD_TIMEOUT_S = 5.0
@@ -168,6 +169,7 @@ class FlightApp:
         options = ["--seed", str(settings.seed), "--truth", str(self.work_dir / TRUTH_FILE)]
         for fault in settings.simulator_faults:
             options += ["--fault", format_fault(fault)]
+        options.append("--lidar" if settings.simulates_lidar else "--no-lidar")
         return await processes.start("sitl", "sitl", settings.mission, *options, *self._common_options())
 
     async def _start_companions(self, processes: Processes) -> list[Child]:
@@ -178,11 +180,19 @@ class FlightApp:
             options = ["--vehicle", str(vehicle.sysid), "--mission", self.settings.mission]
             options += ["--mode", self.settings.mode.value, "--seed", str(self.settings.seed)]
             options += ["--log", str(self.work_dir / f"{name}.jsonl")]
+            options += self._sensor_options(vehicle.sysid)
             for fault in self.settings.faults:
                 if fault.vehicle == vehicle.sysid:
                     options += ["--fault", format_fault(fault)]
             children.append(await processes.start(name, "companion", *options, *self._common_options()))
         return children
+
+    def _sensor_options(self, sysid: int) -> list[str]:
+        """What a companion sees with, and where it hears it."""
+        settings = self.settings
+        port = lidar_packets.FIRST_PORT + sysid - 1 + settings.instance_base
+        address = ["--lidar", f"{settings.lidar_host}:{port}"] if settings.sensor is SensorKind.LIDAR else []
+        return ["--sensor", settings.sensor.value, *address]
 
     def _common_options(self) -> list[str]:
         origin = self.flight.mission.origin

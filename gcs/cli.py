@@ -19,7 +19,7 @@ from missions.errors import MissionError
 from missions.faults import EXAMPLES as FAULT_EXAMPLES
 from missions.faults import SIMULATOR_EXAMPLES, Fault, SimulatorFault, parse_any_fault
 from missions.frames import GeodeticPoint, parse_origin
-from missions.mission import Mission, load_mission, shipped_missions
+from missions.mission import Mission, SensorKind, load_mission, shipped_missions
 
 if TYPE_CHECKING:
     from gcs.desk import Desk
@@ -67,6 +67,12 @@ def fly(
             metavar="SPEC", help=f"what goes wrong, such as {FAULT_EXAMPLES[0]} or {SIMULATOR_EXAMPLES[2]}; repeatable"
         ),
     ] = None,
+    sensor: Annotated[
+        SensorKind, typer.Option(help="what the companions that are started see with")
+    ] = SensorKind.LIDAR,
+    lidar_host: Annotated[
+        str, typer.Option(metavar="HOST", help="where they hear their lidars, at port 56300 and the following ones")
+    ] = "127.0.0.1",
     instance_base: InstanceOption = 0,
 ) -> None:
     """Fly a mission.
@@ -77,7 +83,9 @@ def fly(
 
         gcs fly indoor --sim --headless --speed 5 --report out
 
-        gcs fly field --companions --origin here --link udpin://0.0.0.0:14550     on a real PX4
+        gcs fly field --companions --origin here --link udpin://0.0.0.0:14550     on a real PX4 with a lidar
+
+        gcs fly field --companions --sensor none ...                              on one that sees nothing
 
     Exit codes: 0 every vehicle reached its target safely, 1 it did not (the report says why), 2 bad input.
     """
@@ -105,6 +113,8 @@ def fly(
         faults=tuple(one for one in faults if isinstance(one, Fault)),
         simulator_faults=tuple(one for one in faults if isinstance(one, SimulatorFault)),
         instance_base=instance_base,
+        sensor=sensor,
+        lidar_host=lidar_host,
     )
     raise typer.Exit(_run_flight(settings, load_mission(mission)))
 

@@ -8,6 +8,7 @@ import msgspec
 from gcs.link.url import LinkUrl, Scheme
 from missions.faults import Fault, SimulatorFault
 from missions.frames import GeodeticPoint
+from missions.mission import SensorKind
 
 
 class PlanningMode(Enum):
@@ -61,10 +62,19 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     simulator_faults: tuple[SimulatorFault, ...] = ()
     """Beside those of the mission."""
     instance_base: int = 0
+    sensor: SensorKind = SensorKind.LIDAR
+    """Of the companions that are started."""
+    lidar_host: str = "127.0.0.1"
+    """Where the companions that are started hear their lidars."""
 
     @property
     def starts_companions(self) -> bool:
         return self.mode.needs_companions and self.autopilots is not Autopilots.ATTACHED
+
+    @property
+    def simulates_lidar(self) -> bool:
+        """The simulated vehicles carry range sensors: somebody looks."""
+        return self.mode.needs_companions and self.sensor is not SensorKind.NONE
 
     def ground_links(self) -> tuple[LinkUrl, ...]:
         """The links that were asked for, or the usual port on loopback."""
