@@ -15,6 +15,7 @@ from companion.briefing import Briefing
 from companion.crew import Crew, Figures
 from companion.engagement import Engagement
 from companion.events import Event, FlightMode
+from companion.fleet.exchange import Exchange
 from companion.flight import Flight
 from companion.instructions import CommandResult, Instruction
 from companion.planner.planner import Plan, Planner
@@ -37,16 +38,20 @@ class Pilot:
         mission: with its final origin.
         settings: of this companion.
         planner: for its guide, its braking and its checks; plans themselves are asked for by instruction.
+        exchange: with the other vehicles; without one it flies alone.
     """
 
-    def __init__(self, mission: Mission, settings: CompanionSettings, planner: Planner) -> None:
+    def __init__(
+        self, mission: Mission, settings: CompanionSettings, planner: Planner, exchange: Exchange | None = None
+    ) -> None:
         self.state, self.reason = State.CONNECTING, Reason.NONE
         self.done = False
         """The program may end."""
         self._mission = mission
         self._desk = StatusDesk(mission.digest, settings.pilot.status_interval_s)
         self._settings = settings.pilot
-        self._crew = Crew(mission, planner, settings.pilot, settings.speed)
+        alone = Exchange(settings.vehicle, mission)
+        self._crew = Crew(mission, planner, settings.pilot, settings.speed, exchange or alone)
         self.briefing = Briefing(mission, mission.vehicle(settings.vehicle), settings.mode)
         self._connected = False
         self._odometry: events.Odometry | None = None
@@ -290,6 +295,7 @@ class Pilot:
         if self.in_control:
             yield instructions.EndSetpoints()
         self._flight = self._engagement = self._leaving = None
+        self._crew.exchange.end()
         self.done = self.done or self._stopping
 
     def _release(self, now_s: float) -> Iterator[Instruction]:
@@ -337,7 +343,7 @@ class Pilot:
         self._flight = Flight(self._crew, engagement.order, plan, self._odometry, now_s)
         self._enter(State.FLYING, Reason.NONE)
         yield instructions.Note("flying", {"guide_m": round(plan.guide.length_m, 2)})
-        yield from self._utc.stamped(self._flight.begin())
+        yield from self._utc.stamped(self._flight.begin(now_s))
 
     def _retreat(self, reason: Reason) -> Iterator[Instruction]:
         """Control could not be taken: everything is as it was before the start."""

@@ -1,6 +1,6 @@
 """A flight among others: plans are announced before they are flown, and conflicts are seen in time. Sans-IO."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.fleet.conflict import first_conflict_s
 from companion.fleet.exchange import Exchange
@@ -10,6 +10,8 @@ from missions.mission import Limits
 from missions.trajectory import Trajectory
 from missions.tunnel import TrajectoryKind
 
+RESERVE_M = 0.06
+"""Plans keep so much more distance than is required of them: centimetres on the wire, and in time."""
 LOOK_INTERVAL_S = 0.25
 """Conflicts are looked for whenever something has changed, and so often, since the radius of who is silent grows."""
 
@@ -20,11 +22,28 @@ class Offer:
 
     Args:
         plan: with a trajectory.
+        since_s: when it was announced.
         due_s: when it may be flown.
     """
 
     plan: Plan
+    since_s: float
     due_s: float
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What becomes of an offer.
+
+    Args:
+        plan: which was offered.
+        clear: it is flown.
+        waited_s: for so long it was announced.
+    """
+
+    plan: Plan
+    clear: bool
+    waited_s: float
 
 
 class Traffic:
@@ -55,16 +74,17 @@ class Traffic:
         return self._exchange.wait_s(now_s)
 
     def neighbours(self, now_s: float) -> tuple[Neighbour, ...]:
-        """Whom a new plan has to respect."""
-        return self._exchange.neighbours(now_s, pending=True)
+        """Whom a new plan has to respect, from a little farther off than is checked before it is flown."""
+        others = self._exchange.neighbours(now_s, pending=True)
+        return tuple(replace(other, radius_m=other.radius_m + RESERVE_M) for other in others)
 
     def offer(self, plan: Plan, trajectory: Trajectory, plan_id: int, wait_s: float, now_s: float) -> None:
         """Announce a plan; it is decided about when the wait is over."""
-        self._offer = Offer(plan, now_s + wait_s)
+        self._offer = Offer(plan, now_s, now_s + wait_s)
         self._exchange.offer(trajectory, plan_id, 0, now_s)
 
-    def decided(self, now_s: float) -> tuple[Plan, bool] | None:
-        """A plan whose wait is over, and whether it may be flown; it is not waited for any more."""
+    def decision(self, now_s: float) -> Decision | None:
+        """About a plan whose wait is over; None while there is none."""
         offer = self._offer
         if offer is None or now_s < offer.due_s:
             return None
@@ -76,7 +96,7 @@ class Traffic:
             self._exchange.commit_offer()
         else:
             self._exchange.withdraw()
-        return offer.plan, clear
+        return Decision(offer.plan, clear, now_s - offer.since_s)
 
     def withdraw(self) -> None:
         """What was announced will not be flown."""

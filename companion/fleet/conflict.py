@@ -31,7 +31,8 @@ def first_conflict_s(
     if not neighbours:
         return first_s, whose
     end_s = max(trajectory.end_s, *(n.trajectory.end_s for n in neighbours)) + RESTING_S
-    times_s = np.arange(now_s, min(max(end_s, now_s + RESTING_S), now_s + LONGEST_S), STEP_S)
+    begin_s = max(now_s, trajectory.start_s)
+    times_s = np.arange(begin_s, min(max(end_s, begin_s + RESTING_S), begin_s + LONGEST_S), STEP_S)
     own_m = trajectory.sample(times_s).position_m
     for neighbour in neighbours:
         apart_m = np.linalg.norm(neighbour.trajectory.sample(times_s).position_m - own_m, axis=1)

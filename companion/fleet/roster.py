@@ -112,14 +112,13 @@ class Roster:
             self._note(known, report.message, now_s, ahead_s)
 
     def neighbours(self, now_s: float, before: Order | None = None) -> list[Neighbour]:
-        """What the others do, as far as is known; the nearest first.
+        """What the others do, as far as is known.
 
         Args:
             now_s: this vehicle's time.
             before: plans that are not flown yet count, too, if they were announced before this.
         """
-        found = [n for sysid, known in self.known.items() for n in self._of(sysid, known, now_s, before)]
-        return found
+        return [n for sysid, known in self.known.items() for n in self._of(sysid, known, now_s, before)]
 
     def longest_lag_s(self, now_s: float) -> float | None:
         """The longest that anybody's word took lately; None when nobody was heard."""
