@@ -12,7 +12,7 @@ import numpy as np
 
 from companion import events, instructions
 from companion.briefing import Briefing
-from companion.crew import Crew, Figures
+from companion.crew import Crew
 from companion.engagement import Engagement
 from companion.events import Event, FlightMode
 from companion.fleet.exchange import Exchange
@@ -21,7 +21,7 @@ from companion.instructions import CommandResult, Instruction
 from companion.planner.planner import Plan, Planner
 from companion.settings import CompanionSettings
 from companion.start_answer import Situation, answer
-from companion.states import TRANSITIONS, UNDER_WAY, State
+from companion.states import UNDER_WAY, State, assert_possible
 from companion.status import StatusDesk
 from companion.utc_clock import UtcClock
 from companion.vehicle_clock import REBOOT_S
@@ -50,8 +50,9 @@ class Pilot:
         self._mission = mission
         self._desk = StatusDesk(mission.digest, settings.pilot.status_interval_s)
         self._settings = settings.pilot
-        alone = Exchange(settings.vehicle, mission)
-        self._crew = Crew(mission, planner, settings.pilot, settings.speed, exchange or alone)
+        exchange = exchange or Exchange(settings.vehicle, mission)
+        self._crew = Crew(mission, planner, settings.pilot, settings.speed, exchange)
+        self.figures = self._crew.figures
         self.briefing = Briefing(mission, mission.vehicle(settings.vehicle), settings.mode)
         self._connected = False
         self._odometry: events.Odometry | None = None
@@ -82,10 +83,6 @@ class Pilot:
             events.StopRequested: self._on_stop,
             events.Tick: self._on_tick,
         }
-
-    @property
-    def figures(self) -> Figures:
-        return self._crew.figures
 
     @property
     def in_control(self) -> bool:
@@ -397,10 +394,7 @@ class Pilot:
         if now_s - self._commanded_at_s > self._settings.command_retry_s:
             yield from self._leave(mode, now_s)
 
-    # -------------------------------------------------------------------- status
-
     def _enter(self, state: State, reason: Reason) -> None:
         """Change state; a transition that is not in the table is an error of ours."""
-        if state is not self.state and state not in TRANSITIONS[self.state] | {State.CONNECTING, State.FAILED}:
-            raise AssertionError(f"no transition from {self.state.name} to {state.name} ({reason.name})")
+        assert_possible(self.state, state, reason)
         self.state, self.reason = state, reason
