@@ -55,6 +55,7 @@ class Flight:
         self._asked_order = order
         self._retry_at_s = now_s
         self._announced_item = -1
+        self._conflict_s = np.inf  # when the committed trajectory meets something
 
     @property
     def track_index(self) -> int:
@@ -90,6 +91,7 @@ class Flight:
             self._advanced_s = now_s
             self.course.advance(now_s)
             yield from self._announce_progress()
+        self._conflict_s = self._crew.planner.conflict_s(self.course.latest, now_s)
         trouble = self._trouble(now_s, odometry_age_s, sensor_silent)
         if trouble is not Reason.NONE and self.holding is Reason.NONE:
             yield from self.brake(trouble, now_s)
@@ -104,7 +106,8 @@ class Flight:
         self._crew.figures.replan_ms.add(cpu_ms)
         late_s = now_s - plan.request.start_s
         if plan.trajectory is None:
-            self._retry_at_s = now_s + self._crew.settings.retry_s
+            settings = self._crew.settings
+            self._retry_at_s = now_s + (settings.conflict_retry_s if self._conflict_s < np.inf else settings.retry_s)
             yield instructions.Note("no path found", {"replan_ms": cpu_ms})
         elif late_s > self._crew.lateness_s:
             yield instructions.Note("plan came too late", {"late_s": late_s, "replan_ms": cpu_ms})
@@ -167,6 +170,8 @@ class Flight:
         if self._new_order is not None or self.holding is not Reason.NONE:
             return True
         latest = self.course.latest
+        if self._conflict_s < np.inf:
+            return True
         if self.course.reaches_end and now_s > latest.end_s - NEARLY_DONE_S:
             return False
         return now_s - latest.start_s >= self._crew.settings.replan_age_s
@@ -196,10 +201,16 @@ class Flight:
             return Reason.NO_POSITION
         if sensor_silent:
             return Reason.NO_SENSOR
-        if not self._crew.planner.is_clear(self.course.trajectory(now_s), now_s):
+        if self._conflict_s - now_s < self._brakes_s(now_s):
             return Reason.NO_PATH
         ended = self.is_at_rest(now_s) and not self.course.reaches_end
         return Reason.NO_PATH if ended else Reason.NONE
+
+    def _brakes_s(self, now_s: float) -> float:
+        """Whoever meets something within this time brakes instead of waiting for a plan [s]."""
+        speed_m_s = float(np.linalg.norm(self.course.motion(now_s).velocity_m_s))
+        stops_s = speed_m_s / self._crew.planner.limits.acceleration_m_s2
+        return stops_s + self._crew.allowance_s + self._crew.settings.tick_s
 
     def _announce_progress(self) -> Iterator[Instruction]:
         seq = self.order.track.item_seq[self.track_index]
