@@ -63,6 +63,7 @@ class Flight:
         self._retry_at_s = now_s
         self._replan_ms = 0.0
         self._announced_item = -1
+        self._conflict_s = np.inf  # when the committed trajectory meets something
 
     @property
     def track_index(self) -> int:
@@ -103,6 +104,9 @@ class Flight:
             self.course.advance(now_s)
             yield from self._announce_progress()
         yield from self._decide(now_s)
+        latest = self.course.latest
+        meets_s = self._traffic.conflict_s(latest, now_s)
+        self._conflict_s = min(self._crew.planner.conflict_s(latest, now_s), meets_s - BRAKES_EARLIER_S)
         trouble = self._trouble(now_s, odometry_age_s, sensor_silent)
         if trouble is not Reason.NONE and self.holding is Reason.NONE:
             yield from self.brake(trouble, now_s)
@@ -117,7 +121,8 @@ class Flight:
         self._crew.figures.replan_ms.add(cpu_ms)
         late_s = now_s + self._traffic.wait_s(now_s) - plan.request.start_s
         if plan.trajectory is None:
-            self._retry_at_s = now_s + self._crew.settings.retry_s
+            settings = self._crew.settings
+            self._retry_at_s = now_s + (settings.conflict_retry_s if self._conflict_s < np.inf else settings.retry_s)
             yield instructions.Note("no path found", {"replan_ms": cpu_ms})
         elif late_s > self._crew.lateness_s:
             yield instructions.Note("plan came too late", {"late_s": late_s, "replan_ms": cpu_ms})
@@ -212,11 +217,11 @@ class Flight:
             return False
         if self._traffic.is_waiting:
             return False
-        if self._traffic.conflict_s(self.course.latest, now_s) < np.inf:
-            return True
         if self._new_order is not None or self.holding is not Reason.NONE:
             return True
         latest = self.course.latest
+        if self._conflict_s < np.inf:
+            return True
         if self.course.reaches_end and now_s > latest.end_s - NEARLY_DONE_S:
             return False
         return now_s - latest.start_s >= self._crew.settings.replan_age_s
@@ -247,17 +252,16 @@ class Flight:
             return Reason.NO_POSITION
         if sensor_silent:
             return Reason.NO_SENSOR
-        if not self._crew.planner.is_clear(self.course.trajectory(now_s), now_s):
-            return Reason.NO_PATH
-        if self._traffic.conflict_s(self.course.latest, now_s) < now_s + self._stopping_s(now_s):
+        if self._conflict_s - now_s < self._brakes_s(now_s):
             return Reason.NO_PATH
         ended = self.is_at_rest(now_s) and not self.course.reaches_end
         return Reason.NO_PATH if ended else Reason.NONE
 
-    def _stopping_s(self, now_s: float) -> float:
-        """How long it takes to brake, and a little more."""
+    def _brakes_s(self, now_s: float) -> float:
+        """Whoever meets something within this time brakes instead of waiting for a plan [s]."""
         speed_m_s = float(np.linalg.norm(self.course.motion(now_s).velocity_m_s))
-        return BRAKES_EARLIER_S + speed_m_s * np.pi / (2.0 * self._crew.planner.limits.acceleration_m_s2)
+        stops_s = speed_m_s / self._crew.planner.limits.acceleration_m_s2
+        return stops_s + self._crew.allowance_s + self._crew.settings.tick_s
 
     def _announce_progress(self) -> Iterator[Instruction]:
         seq = self.order.track.item_seq[self.track_index]

@@ -64,7 +64,9 @@ class PilotSettings:
     replan_age_s: float = 1.0
     """A committed trajectory is replaced when it is this old."""
     retry_s: float = 0.3
-    """Between a failed plan and the next attempt."""
+    """Between a failed plan and the next attempt ..."""
+    conflict_retry_s: float = 0.1
+    """... where the committed trajectory meets something."""
     planning_allowance_wall_s: float = 0.06
     """A plan begins this much in the future: search and thread switches fit in (wall clock)."""
     lateness_wall_s: float = 0.06
