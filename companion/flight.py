@@ -12,10 +12,12 @@ from companion.course import Course
 from companion.crew import Crew
 from companion.events import Odometry
 from companion.instructions import Instruction
+from companion.planner.guide import Guide
 from companion.planner.planner import Plan, PlanRequest
 from companion.setpoints import Heading, Setpoint
 from companion.traffic import Traffic
 from missions.frames import AutopilotFrame
+from missions.mission_items import Track
 from missions.trajectory import Motion, Trajectory, at_rest
 from missions.tunnel import Reason, TrajectoryKind, TrajectoryMessage
 
@@ -64,10 +66,13 @@ class Flight:
         self._replan_ms = 0.0
         self._announced_item = -1
         self._conflict_s = np.inf  # when the committed trajectory meets something
+        self._asked_aside = self._asked_wanted = False
+        self._left_track_at: int | None = None
+        """The track point that was flown to when the vehicle began to make way for another one."""
 
     @property
     def track_index(self) -> int:
-        return self.course.track_index
+        return self.course.track_index if self._left_track_at is None else self._left_track_at
 
     @property
     def newest_order(self) -> FlightOrder:
@@ -105,6 +110,7 @@ class Flight:
             yield from self._announce_progress()
         yield from self._decide(now_s)
         latest = self.course.latest
+        self._traffic.look(latest, now_s, idle=self.course.reaches_end and self.is_at_rest(now_s))
         meets_s = self._traffic.conflict_s(latest, now_s)
         self._conflict_s = min(self._crew.planner.conflict_s(latest, now_s), meets_s - BRAKES_EARLIER_S)
         trouble = self._trouble(now_s, odometry_age_s, sensor_silent)
@@ -120,7 +126,10 @@ class Flight:
         self._asked = None
         self._crew.figures.replan_ms.add(cpu_ms)
         late_s = now_s + self._traffic.wait_s(now_s) - plan.request.start_s
-        if plan.trajectory is None:
+        if self._asked_wanted:
+            self._traffic.want(plan.trajectory, self.order.plan_id, now_s)
+        elif plan.trajectory is None:
+            self._traffic.note_no_path(plan.request.start.position_m, now_s)
             settings = self._crew.settings
             self._retry_at_s = now_s + (settings.conflict_retry_s if self._conflict_s < np.inf else settings.retry_s)
             yield instructions.Note("no path found", {"replan_ms": cpu_ms})
@@ -200,11 +209,16 @@ class Flight:
             yield from self._commit(decision.plan, now_s)
         else:
             self._retry_at_s = now_s
+            self._traffic.note_no_path(self.course.motion(now_s).position_m, now_s)
             yield instructions.Note("plan withdrawn", {"waited_s": decision.waited_s})
 
     def _commit(self, plan: Plan, now_s: float) -> Iterator[Instruction]:
         assert plan.trajectory is not None
-        self.course.commit(plan, now_s)
+        if self._asked_aside and self._left_track_at is None:
+            self._left_track_at = self.course.track_index
+        elif not self._asked_aside:
+            self._left_track_at = None
+        self.course.commit(replace(plan, reaches_end=plan.reaches_end and not self._asked_aside), now_s)
         yield instructions.Note("plan committed", {"replan_ms": self._replan_ms, "reaches_end": plan.reaches_end})
         self.holding = Reason.NONE
         self._crew.figures.replans += 1
@@ -215,8 +229,10 @@ class Flight:
     def _wants_plan(self, now_s: float) -> bool:
         if self._asked is not None or now_s < self._retry_at_s or self.holding is Reason.STOPPED_BY_OPERATOR:
             return False
-        if self._traffic.is_waiting:
+        if self._traffic.is_waiting or self._traffic.is_aside(self.course.latest):
             return False
+        if self._traffic.makes_way or self._left_track_at is not None:
+            return True
         if self._new_order is not None or self.holding is not Reason.NONE:
             return True
         latest = self.course.latest
@@ -230,14 +246,25 @@ class Flight:
         start_s = now_s + self._crew.allowance_s + self._traffic.wait_s(now_s)
         on_course = self._error_m(now_s) <= self._crew.lost_track_m
         start = self.course.motion(start_s) if on_course else self._estimate(start_s)
-        guide, arc_m = self.course.guide, self.course.arc_m
         self._asked_order = self._new_order or self.order
-        if self._new_order is not None:
-            guide, arc_m = self._crew.planner.lay_guide(self._new_order.track, 0, start.position_m), 0.0
+        guide, arc_m = self._guide(start.position_m)
         committed = self.course.trajectory(start_s) if on_course else None
-        others = self._traffic.neighbours(now_s)
+        self._asked_wanted = self._traffic.shall_want(now_s)
+        others = self._traffic.before(now_s) if self._asked_wanted else self._traffic.neighbours(now_s)
         self._asked = PlanRequest(self._crew.next_number(), start, start_s, guide, arc_m, committed, others)
         return self._asked
+
+    def _guide(self, from_m: Array) -> tuple[Guide, float]:
+        """What the next plan follows, and how much of it is done: the track, or a way aside."""
+        lay_guide, aside_m = self._crew.planner.lay_guide, self._traffic.place_aside_m
+        self._asked_aside = self._traffic.makes_way and aside_m is not None
+        if self._asked_aside and aside_m is not None:
+            return lay_guide(Track(aside_m[None], np.array([np.nan]), (0,)), 0, from_m), 0.0
+        if self._new_order is not None:
+            return lay_guide(self._new_order.track, 0, from_m), 0.0
+        if self._left_track_at is not None:
+            return lay_guide(self.order.track, self._left_track_at, from_m), 0.0
+        return self.course.guide, self.course.arc_m
 
     def _estimate(self, at_s: float) -> Motion:
         """Where the vehicle itself will be, as far as odometry tells."""
@@ -254,7 +281,7 @@ class Flight:
             return Reason.NO_SENSOR
         if self._conflict_s - now_s < self._brakes_s(now_s):
             return Reason.NO_PATH
-        ended = self.is_at_rest(now_s) and not self.course.reaches_end
+        ended = self.is_at_rest(now_s) and not self.course.reaches_end and not self._traffic.makes_way
         return Reason.NO_PATH if ended else Reason.NONE
 
     def _brakes_s(self, now_s: float) -> float:
