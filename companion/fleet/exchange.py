@@ -31,6 +31,7 @@ class Told:
     """Its trajectory is in vehicle time, its announcement in UTC."""
     since_s: float
     due_s: float = float("-inf")
+    copies: int = 0
 
 
 class Exchange:
@@ -121,11 +122,11 @@ class Exchange:
         """What is to be said now, in UTC."""
         reports: list[Report] = []
         if self.utc_ahead_s is not None:
-            for told, quickly in ((self._flown, False), (self._offered, True), (self._wanted, False)):
+            for told in (self._flown, self._offered, self._wanted):
                 if told is not None and now_s >= told.due_s:
                     reports.append(PlanReport(self.sysid, self._in_utc(told.message, now_s + self.utc_ahead_s)))
-                    urgent = quickly or now_s - told.since_s < self.settings.urgent_s
-                    told.due_s = now_s + (self.settings.urgent_repeat_s if urgent else self.settings.repeat_s)
+                    told.copies += 1
+                    told.due_s = now_s + self._interval_s(told, now_s)
         if place is not None and now_s >= self._position_due_s:
             self._position_due_s = now_s + self.settings.position_interval_s
             utc_s = None if self.utc_ahead_s is None else place.utc_s
@@ -133,6 +134,14 @@ class Exchange:
         return reports
 
     # ------------------------------------------------------------------ details
+
+    def _interval_s(self, told: Told, now_s: float) -> float:
+        """Until something is told again."""
+        settings = self.settings
+        if told.copies < settings.copies_at_once:
+            return 0.0
+        urgent = told is self._offered or now_s - told.since_s < settings.urgent_s
+        return settings.urgent_repeat_s if urgent else settings.repeat_s
 
     @property
     def _order(self) -> Order:

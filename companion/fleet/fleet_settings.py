@@ -9,6 +9,8 @@ class FleetSettings:
 
     repeat_s: float = 0.5
     """Every plan that is flown is told again so often ..."""
+    copies_at_once: int = 3
+    """What is new is told in so many ticks one after the other: one loss does not undo the wait ..."""
     urgent_repeat_s: float = 0.1
     """... and more often while it is new, and while it is not flown yet ..."""
     urgent_s: float = 0.35
@@ -18,8 +20,8 @@ class FleetSettings:
     """Between a plan's announcement and its commitment, when somebody listens ..."""
     longest_wait_s: float = 1.0
     """... and at most; a link that takes longer is as good as none."""
-    wait_margin_s: float = 0.04
-    """Longer than the longest that anybody's word took lately: ticks at both ends, and clocks that differ."""
+    wait_margin_s: float = 0.06
+    """Longer than the longest that anybody's word took lately: for copies, ticks at both ends, clocks that differ."""
     clock_bound_s: float = 0.05
     """Clocks that are set by GNSS differ by no more. Plans from farther in the future are not believed."""
     latest_s: float = 3.0
