@@ -14,6 +14,7 @@ import typer
 
 from gcs import settings as chosen
 from gcs.commands.convert import convert
+from gcs.commands.plan_output import check_output, write_plan
 from gcs.commands.replay import replay
 from gcs.errors import GcsError, UsageError
 from gcs.link.url import parse_link_url
@@ -133,7 +134,9 @@ def plan(
     seed: SeedOption = 0,
     evaluations: Annotated[int | None, typer.Option(min=1, help="stop after so many evaluations")] = None,
     budget_s: Annotated[float | None, typer.Option("--budget-s", min=0.001, help="stop after so much time")] = None,
-    output: Annotated[Path | None, typer.Option(metavar="FILE", help="where the plan goes, as .json")] = None,
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="where the plan goes: .json, .plan or .waypoints")
+    ] = None,
 ) -> None:
     """Plan a mission and say what came out; nothing is sent to any vehicle.
 
@@ -142,9 +145,11 @@ def plan(
         gcs plan terrain-1-5uav --seed 3 --output plan.json
 
         gcs plan indoor --algorithm pso --evaluations 3000
+
+        gcs plan indoor --output indoor.plan                      for QGroundControl: indoor-alpha.plan, indoor-bravo.plan
     """
     if output is not None:
-        _check_output(output)
+        check_output(output)
     from rich.console import Console
 
     from gcs.console import PlanConsole, print_plan
@@ -162,7 +167,8 @@ def plan(
         )
     print_plan(console, found)
     if output is not None:
-        _write(output, found.to_json())
+        for line in write_plan(output, loaded, found):
+            console.print(line, markup=False)
     raise typer.Exit(0 if found.feasible else 1)
 
 
@@ -340,21 +346,6 @@ def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
     if text == "here":
         return chosen.OriginHere.HERE
     return parse_origin(text)
-
-
-def _check_output(path: Path) -> None:
-    """Refuse what cannot be written before anything is worked out."""
-    if path.suffix != ".json":
-        raise UsageError(f"--output {path}: expected a name that ends in .json")
-    if not path.parent.is_dir():
-        raise UsageError(f"--output {path}: cannot be written: {path.parent} is no directory")
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text)
-    except OSError as problem:
-        raise UsageError(f"--output {path}: cannot be written: {problem.strerror}") from None
 
 
 def _as_interrupt(*_: object) -> None:
