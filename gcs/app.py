@@ -22,6 +22,7 @@ from gcs.flight.trails import Trails
 from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
+from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere
 from gcs.station import Station
@@ -65,6 +66,8 @@ class FlightApp:
         self.settings, self.work_dir, self._page = settings, work_dir, page
         self._keys = key_ring(settings, mission, work_dir, events)
         station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+        self._audit = AuditFile(work_dir / AUDIT_FILE)
+        station.audit = Audit(self._audit.write, station.unix_us)
         station.codec.signing = self._keys.signing(station.unix_us)
         flight = FleetFlight(
             station=station,
@@ -104,6 +107,7 @@ class FlightApp:
         async with AsyncExitStack() as stack:
             assert self.station.recording is not None
             stack.callback(self.station.recording.close)
+            stack.callback(self._audit.close)
             for url in self.settings.ground_links():
                 connection = await open_udp(url, self.station.receive)
                 stack.callback(connection.close)

@@ -1,12 +1,11 @@
 """The command line of the ground station: `gcs fly`, `gcs plan`, `gcs check`, `gcs watch`, `gcs experiment`."""
 
 import asyncio
-import contextlib
 import signal
 import sys
-import tempfile
 import time
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,9 +13,11 @@ import typer
 
 from gcs import settings as chosen
 from gcs.commands.convert import convert
+from gcs.commands.key import app as key_app
 from gcs.commands.plan_output import check_output, write_plan
 from gcs.commands.replay import replay
 from gcs.errors import GcsError, UsageError
+from gcs.folders import flights_folder, new_flight_folder
 from gcs.link.url import parse_link_url
 from missions.errors import MissionError
 from missions.faults import EXAMPLES as FAULT_EXAMPLES
@@ -146,7 +147,7 @@ def plan(
 
         gcs plan indoor --algorithm pso --evaluations 3000
 
-        gcs plan indoor --output indoor.plan                      for QGroundControl: indoor-alpha.plan, indoor-bravo.plan
+        gcs plan indoor --output indoor.plan      for QGroundControl: indoor-alpha.plan, indoor-bravo.plan
     """
     if output is not None:
         check_output(output)
@@ -204,15 +205,17 @@ def watch(
         gcs watch --link udpin://0.0.0.0:14550
     """
     from gcs.console import FlightConsole
-    from gcs.flight.events import EventLog
+    from gcs.flight.events import BEGAN, EventLog
     from gcs.view.server import serve_page
     from gcs.watch import watch as run_watch
 
     settings = chosen.FlightSettings(mission="", links=tuple(parse_link_url(text) for text in link or ()), keys=keys)
-    console = FlightConsole()
-    events = EventLog(time.monotonic, listeners=[console.show])
+    console, work_dir = FlightConsole(), _work_dir(None, "watch")
+    events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
+    events.add(BEGAN, "gcs watch", unix_us=time.time_ns() // 1000)
+    console.say(f"recorded in {work_dir}")
     console.say(f"page: http://127.0.0.1:{port}")
-    asyncio.run(run_watch(settings, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
+    asyncio.run(run_watch(settings, events, work_dir, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
 
 
 @app.command()
@@ -274,6 +277,7 @@ def missions() -> None:
 
 app.command()(convert)
 app.command()(replay)
+app.add_typer(key_app, name="key")
 
 
 def main() -> None:
@@ -299,7 +303,8 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     if isinstance(settings.origin, GeodeticPoint):
         mission = mission.moved_to(settings.origin)
     console = FlightConsole()
-    with _work_dir(settings.report_dir) as work_dir, PlanConsole(console.console) as progress:
+    work_dir = _work_dir(settings.report_dir, mission.name)
+    with PlanConsole(console.console) as progress:
         events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
         events.add(BEGAN, f"gcs fly {settings.mission}", unix_us=time.time_ns() // 1000)
         with PlannerProcess("ecpso", settings.seed, [progress.show]) as planner:
@@ -307,8 +312,7 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
         events.close()
     verdict = "success" if report.success else "FAILED"
     console.say(f"{verdict}: {report.reason}", style="green" if report.success else "bold red")
-    if settings.report_dir is not None:
-        console.say(f"report: {settings.report_dir / 'report.json'}")
+    console.say(f"report: {work_dir / 'report.json'}")
     return 0 if report.success else 1
 
 
@@ -326,18 +330,15 @@ async def _fly(
     return await app.run()
 
 
-@contextlib.contextmanager
-def _work_dir(report_dir: Path | None) -> Iterator[Path]:
-    """The report's directory, or one that is thrown away."""
-    if report_dir is None:
-        with tempfile.TemporaryDirectory(prefix="gcs-") as scratch:
-            yield Path(scratch)
-        return
+def _work_dir(report_dir: Path | None, name: str) -> Path:
+    """The report's directory, or one among all flights, which are kept."""
     try:
+        if report_dir is None:
+            return new_flight_folder(name, datetime.now(UTC))
         report_dir.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise UsageError(f"--report {report_dir}: cannot be made: {problem.strerror}") from None
-    yield report_dir
+        raise UsageError(f"{report_dir or flights_folder()}: cannot be made: {problem.strerror} (--report)") from None
+    return report_dir
 
 
 def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:

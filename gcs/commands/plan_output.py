@@ -30,7 +30,7 @@ def write_plan(path: Path, mission: Mission, plan: FleetPlan) -> list[str]:
     `x.plan` and `x.waypoints` become one file per vehicle, `x-<name>.plan`, for an autopilot that stands on its pad.
 
     Raises:
-        UsageError: a file cannot be written.
+        UsageError: a file cannot be written, or nobody should fly what would be in it.
     """
     from gcs.files.conversion import Format, format_document, format_of
     from gcs.files.sources import vehicle_document
@@ -38,6 +38,8 @@ def write_plan(path: Path, mission: Mission, plan: FleetPlan) -> list[str]:
     if path.suffix == ".json":
         write_text(path, plan.to_json())
         return [f"plan: {path}"]
+    if not plan.feasible:
+        raise UsageError(f"--output {path}: the plan is not feasible; only .json takes one that must not be flown")
     kind, lines = format_of(path), []
     for part in plan.vehicles:
         document = vehicle_document(mission, plan, part)

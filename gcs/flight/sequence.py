@@ -21,6 +21,7 @@ from gcs.flight.route import RouteWatch
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.flight.vehicle_orders import VehicleOrders
 from gcs.planner.plan import FleetPlan, VehiclePlan
+from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.mission import Mission
@@ -230,7 +231,8 @@ class FleetFlight:
 
     async def _order(self, flight: VehicleFlight, mode: Mode) -> None:
         try:
-            await self.orders.command(flight, actions.set_mode(mode))
+            with acting_as(Origin.MONITOR):
+                await self.orders.command(flight, actions.set_mode(mode))
         except (CommandRefused, LinkLost) as problem:
             self.events.add("refused", str(problem), flight.name, Severity.ERROR)
 
