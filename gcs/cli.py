@@ -28,6 +28,7 @@ from missions.mission import Mission, SensorKind, load_mission, shipped_missions
 if TYPE_CHECKING:
     from gcs.desk import Desk
     from gcs.flight.events import EventLog
+    from gcs.flight.journal import Story
     from gcs.flight.report import FlightReport
     from gcs.planner_process import PlannerProcess
 
@@ -298,17 +299,20 @@ def main() -> None:
 def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     from gcs.console import FlightConsole, PlanConsole
     from gcs.flight.events import BEGAN, EventLog
+    from gcs.flight.rejoining import left_in_flight, unfinished
     from gcs.planner_process import PlannerProcess
 
     if isinstance(settings.origin, GeodeticPoint):
         mission = mission.moved_to(settings.origin)
     console = FlightConsole()
-    work_dir = _work_dir(settings.report_dir, mission.name)
+    left = left_in_flight(flights_folder(), mission) if settings.report_dir is None and not settings.simulated else None
+    work_dir = left or _work_dir(settings.report_dir, mission.name)
+    story = None if settings.simulated else unfinished(work_dir, mission)
     with PlanConsole(console.console) as progress:
-        events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
+        events = EventLog(time.monotonic, work_dir / "events.jsonl", [], [console.show], keep=story is not None)
         events.add(BEGAN, f"gcs fly {settings.mission}", unix_us=time.time_ns() // 1000)
         with PlannerProcess("ecpso", settings.seed, [progress.show]) as planner:
-            report = asyncio.run(_fly(settings, mission, planner, events, work_dir))
+            report = asyncio.run(_fly(settings, mission, planner, events, work_dir, story))
         events.close()
     verdict = "success" if report.success else "FAILED"
     console.say(f"{verdict}: {report.reason}", style="green" if report.success else "bold red")
@@ -317,7 +321,12 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
 
 
 async def _fly(
-    settings: chosen.FlightSettings, mission: Mission, planner: "PlannerProcess", events: "EventLog", work_dir: Path
+    settings: chosen.FlightSettings,
+    mission: Mission,
+    planner: "PlannerProcess",
+    events: "EventLog",
+    work_dir: Path,
+    story: "Story | None",
 ) -> "FlightReport":
     from gcs.app import FlightApp
     from gcs.view.server import serve_page
@@ -325,7 +334,7 @@ async def _fly(
     def page(desk: "Desk", first_browser: asyncio.Event) -> Coroutine[None, None, None]:
         return serve_page(desk, settings.host, settings.port, first_browser)
 
-    app = FlightApp(settings, mission, planner.plan, events, work_dir, None if settings.headless else page)
+    app = FlightApp(settings, mission, planner.plan, events, work_dir, None if settings.headless else page, story)
     planner.on_progress.append(app.desk.on_plan_progress)
     return await app.run()
 
