@@ -14,6 +14,7 @@ import typer
 from gcs import settings as chosen
 from gcs.commands.convert import convert
 from gcs.commands.key import app as key_app
+from gcs.commands.plan_flight import GivenPlanner, is_plan_file, kept_mission, settings_and_plan
 from gcs.commands.plan_output import check_output, write_plan
 from gcs.commands.replay import replay
 from gcs.errors import GcsError, UsageError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from gcs.flight.events import EventLog
     from gcs.flight.journal import Story
     from gcs.flight.report import FlightReport
+    from gcs.planner.plan import FleetPlan
     from gcs.planner_process import PlannerProcess
 
 BAD_INPUT = 2
@@ -83,10 +85,13 @@ def fly(
     ] = "127.0.0.1",
     instance_base: InstanceOption = 0,
     keys: KeysOption = None,
+    vehicle: Annotated[int, typer.Option(min=1, max=250, help="who flies a .plan: a system id")] = 1,
 ) -> None:
-    """Fly a mission.
+    """Fly a mission, or a plan of another tool (.plan, .waypoints; by the autopilot alone).
 
     Examples:
+
+        gcs fly survey.plan --vehicle 3 --link udpin://0.0.0.0:14550
 
         gcs fly indoor --sim                                  on the bundled simulator, with the web page
 
@@ -126,6 +131,8 @@ def fly(
         sensor=sensor,
         lidar_host=lidar_host,
     )
+    if is_plan_file(mission):
+        raise typer.Exit(_run_flight(*settings_and_plan(settings, vehicle)))
     raise typer.Exit(_run_flight(settings, load_mission(mission)))
 
 
@@ -296,7 +303,7 @@ def main() -> None:
         sys.exit(130)
 
 
-def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
+def _run_flight(settings: chosen.FlightSettings, mission: Mission, given: "FleetPlan | None" = None) -> int:
     from gcs.console import FlightConsole, PlanConsole
     from gcs.flight.events import BEGAN, EventLog
     from gcs.flight.rejoining import left_in_flight, unfinished
@@ -311,7 +318,10 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     with PlanConsole(console.console) as progress:
         events = EventLog(time.monotonic, work_dir / "events.jsonl", [], [console.show], keep=story is not None)
         events.add(BEGAN, f"gcs fly {settings.mission}", unix_us=time.time_ns() // 1000)
-        with PlannerProcess("ecpso", settings.seed, [progress.show]) as planner:
+        if given is not None:
+            settings = kept_mission(settings, mission, work_dir)
+        with PlannerProcess("ecpso", settings.seed, [progress.show]) as process:
+            planner = process if given is None else GivenPlanner(given)
             report = asyncio.run(_fly(settings, mission, planner, events, work_dir, story))
         events.close()
     verdict = "success" if report.success else "FAILED"
@@ -323,7 +333,7 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
 async def _fly(
     settings: chosen.FlightSettings,
     mission: Mission,
-    planner: "PlannerProcess",
+    planner: "PlannerProcess | GivenPlanner",
     events: "EventLog",
     work_dir: Path,
     story: "Story | None",

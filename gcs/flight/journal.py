@@ -4,6 +4,7 @@ One JSON object a line, appended while the flight goes on: how it began, each pl
 and how far each has come. A torn last line is left out. The file is locked while its ground station lives.
 """
 
+import contextlib
 import fcntl
 import math
 import os
@@ -17,6 +18,7 @@ from gcs.flight.monitor import Phase
 from gcs.flight.sequence import FleetFlight
 from gcs.planner.plan import FleetPlan, VehiclePlan
 from gcs.settings import PlanningMode
+from missions.errors import WireFormatError
 from missions.mission import Mission, Target
 from missions.mission_items import MissionItem, Track
 
@@ -139,7 +141,8 @@ class Story:
             monitor.offboard_losses = progress.offboard_losses
             monitor.route.passed = set(progress.passed)
             if self.items.get(sysid):
-                part.take_items(self.items[sysid], flight.mission)
+                with contextlib.suppress(WireFormatError):  # of another tool: there are no stops of ours in it
+                    part.take_items(self.items[sysid], flight.mission)
 
 
 class JournalKeeper:
