@@ -14,9 +14,11 @@ from gcs.desk.desk import PlannerChoice
 from gcs.desk.intents import NewMission
 from gcs.errors import GcsError, KeyRingError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
+from gcs.flight.journal import JOURNAL_FILE, JournalKeeper, Story
 from gcs.flight.picture import draw_flight
 from gcs.flight.preflight import origin_here
 from gcs.flight.preparation import CONNECT_TIMEOUT_S
+from gcs.flight.rejoining import rejoin
 from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
@@ -26,6 +28,7 @@ from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
 from gcs.programs import FlightPrograms
+from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere, PlanningMode
 from gcs.station import Station
@@ -57,6 +60,10 @@ class FlightApp:
         work_dir: for the report and the logs of all programs; further flights have folders of their own in it.
         page: serves the web page; None for a headless run, which ends when the flight has ended.
         choice: the planner, as far as it can be chosen on the page.
+        story: a flight that was left in the air by a ground station that has crashed: it is gone on with.
+
+    Raises:
+        UsageError: another ground station, alive, flies with this `work_dir`.
     """
 
     def __init__(
@@ -68,17 +75,24 @@ class FlightApp:
         work_dir: Path,
         page: Page | None = None,
         choice: PlannerChoice | None = None,
+        story: Story | None = None,
     ) -> None:
         self.settings, self.work_dir, self.events = settings, work_dir, events
         self._planner, self._page = planner, page
-        self.station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+        self._journal = _journal(work_dir)
+        self.station = Station(recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None))
+        self._audit = AuditFile(work_dir / AUDIT_FILE)
+        self.station.audit = Audit(self._audit.write, self.station.unix_us)
         self.programs = self._new_programs(mission, settings.mission, work_dir)
         self.flight = self._new_flight(mission, settings.mode)
+        self._restored = story is not None
+        if story is not None:
+            story.restore(self.flight)
         self.desk = Desk(
             self.station,
             events,
             self.flight,
-            Trails(mission.frame),
+            Trails(self.flight.mission.frame),
             simulated=self._simulated,
             opener=self.open if page is not None else None,
             planner=choice,
@@ -104,7 +118,10 @@ class FlightApp:
         except* GcsError as problems:
             reason = str(_first(problems))
             self.events.add("failed", reason, severity=Severity.ERROR)
-        return self.report or self._write_report(reason)
+        try:
+            return self.report or self._write_report(reason)
+        finally:
+            self._journal.close()
 
     async def open(self, new: NewMission | None, mode: PlanningMode | None) -> None:
         """Put another mission onto the desk, or the same one in another mode; its programs are started.
@@ -133,6 +150,7 @@ class FlightApp:
         self.desk.plan_progress.clear()
         self.desk.observations.histories.clear()
         self.report, self._started_s = None, time.monotonic()
+        self._journal.begin(self.flight, self.station.unix_us())
         self.events.add("loaded", f"mission {mission.name}, {len(mission.vehicles)} vehicles, mode {mode.value}")
         await self._start_programs()
 
@@ -163,6 +181,7 @@ class FlightApp:
         async with AsyncExitStack() as stack:
             assert self.station.recording is not None
             stack.callback(self.station.recording.close)
+            stack.callback(self._audit.close)
             for url in self.settings.ground_links():
                 connection = await open_udp(url, self.station.receive)
                 stack.callback(connection.close)
@@ -184,9 +203,15 @@ class FlightApp:
     async def _fly(self) -> None:
         """The flight, and with a page whatever the operator does until the session is ended."""
         try:
+            if self._restored:
+                await rejoin(self.flight, self.events)
+                await self.desk.follow()
+            else:
+                self._journal.begin(self.flight, self.station.unix_us())
             if self._page is not None:
                 await self._serve_operator()
-            await self.desk.fly()
+            if not self._restored:
+                await self.desk.fly()
             self.report = self._write_report("")
         except GcsError as problem:
             await self._leave_holding(str(problem))
@@ -197,12 +222,14 @@ class FlightApp:
             await self._leave_holding("interrupted" if cancelled else f"interrupted ({type(ended).__name__})")
             raise
         finally:
+            self._journal.look(self.flight, self.station.unix_us())
             await self.desk.close()
 
     async def _serve_operator(self) -> None:
         """In the simulator the flight begins by itself, unless the operator takes over; on real vehicles never."""
         self.events.add("page", f"page: {self.settings.page_url}")
-        if self._simulated and not self.settings.waits and await self._nobody_takes_over():
+        begins = self._simulated and not self.settings.waits and not self._restored
+        if begins and await self._nobody_takes_over():
             try:
                 await self.desk.fly()
             except GcsError as problem:
@@ -222,7 +249,7 @@ class FlightApp:
         return not self.desk.taken_over.is_set()
 
     async def _leave_holding(self, why: str) -> None:
-        if not self.flight.in_flight:
+        if not self.flight.in_flight or self.flight.passive:
             return
         self.events.add("hold", f"Hold for all vehicles in flight: {why}", severity=Severity.WARNING)
         orders = asyncio.ensure_future(self.flight.hold_all(why))
@@ -248,7 +275,7 @@ class FlightApp:
 
     async def _settle_origin(self) -> None:
         """With `--origin here`, move the mission to where its first vehicle stands."""
-        if self.settings.origin is not OriginHere.HERE:
+        if self.settings.origin is not OriginHere.HERE or self._restored:
             return
         mission, vehicles = self.flight.mission, self.station.fleet.vehicles
         first = mission.vehicles[0]
@@ -281,6 +308,7 @@ class FlightApp:
             self.desk.trails.sample(self.station.fleet, offsets_m)
             self.desk.collect_texts()
             self._security.look(self.station.now_s)
+            self._journal.look(self.flight, self.station.unix_us())
             await asyncio.sleep(TRAIL_INTERVAL_S / self.settings.speed)
 
     async def _write_reports(self) -> None:
@@ -301,6 +329,8 @@ class FlightApp:
         names = {vehicle.sysid: vehicle.name for vehicle in self.flight.mission.vehicles}
         tracks = {names[sysid]: part.in_flight().positions_m for sysid, part in flown.items() if sysid in names}
         draw_flight(folder / "flight.png", self.flight.mission, self.flight.plan, tracks)
+        self._journal.look(self.flight, self.station.unix_us())
+        self._journal.end(report.success, self.station.unix_us())
         return report
 
     def _flown(self) -> dict[int, Flown]:
@@ -338,6 +368,13 @@ def key_ring(settings: FlightSettings, mission: Mission, work_dir: Path, events:
         ring = KeyRing(work_dir / "keys")
         ring.ensure(sysids)
     return ring
+
+
+def _journal(work_dir: Path) -> JournalKeeper:
+    try:
+        return JournalKeeper(work_dir / JOURNAL_FILE)
+    except BlockingIOError:
+        raise UsageError(f"{work_dir}: another ground station is flying with this folder") from None
 
 
 def _first(group: BaseExceptionGroup) -> BaseException:

@@ -78,6 +78,10 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Whoever opens the page has to know it."""
 
     @property
+    def simulated(self) -> bool:
+        return self.autopilots is Autopilots.SIMULATED
+
+    @property
     def page_url(self) -> str:
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}"

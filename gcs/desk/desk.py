@@ -27,6 +27,7 @@ from gcs.flight.trails import Trails
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.planner.plan import Progress
 from gcs.replay.player import Player
+from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.errors import MissionError
@@ -224,6 +225,11 @@ class Desk:
         assert self.flight is not None
         await self._step(Intent.FLY, self.flight.fly)
 
+    async def follow(self) -> None:
+        """Follow a flight that is in the air already, as FLY does once all have started."""
+        assert self.flight is not None
+        await self._step(Intent.FLY, self.flight.watch)
+
     def _enter(self, intent: Intent, sysid: int | None, by: str | None) -> Order:
         who = self.name(sysid) if sysid is not None else "the flight"
         return self.orders.enter(Order(intent, sysid, who, by, self.station.now_s))
@@ -235,8 +241,10 @@ class Desk:
         return task
 
     async def _perform(self, order: Order, work: Callable[[], Awaitable[None]]) -> None:
+        origin = Origin.SEQUENCE if order.sysid is None else Origin.OPERATOR
         try:
-            await work()
+            with acting_as(origin):
+                await work()
         except (GcsError, MissionError) as problem:
             self.orders.close(order, outcome_of(problem), str(problem))
             vehicle = order.who if order.sysid is not None else None
