@@ -8,7 +8,7 @@ from pathlib import Path
 from gcs.flight.events import EventLog
 from gcs.processes import Child, Processes
 from gcs.settings import FlightSettings, PlanningMode
-from missions import lidar_packets
+from missions import lidar_packets, ports
 from missions.faults import format_fault
 from missions.mission import Mission, SensorKind
 
@@ -64,7 +64,7 @@ class FlightPrograms:
             options = ["--vehicle", str(vehicle.sysid), "--mission", self.source]
             options += ["--mode", mode.value, "--seed", str(self.settings.seed)]
             options += ["--log", str(self.log_dir / f"{name}.jsonl")]
-            options += self._sensor_options(vehicle.sysid)
+            options += self._sensor_options(vehicle.sysid) + self._fleet_options()
             for fault in self.settings.faults:
                 if fault.vehicle == vehicle.sysid:
                     options += ["--fault", format_fault(fault)]
@@ -86,8 +86,15 @@ class FlightPrograms:
         address = ["--lidar", f"{settings.lidar_host}:{port}"] if settings.sensor is SensorKind.LIDAR else []
         return ["--sensor", settings.sensor.value, *address]
 
+    def _fleet_options(self) -> list[str]:
+        """How companions of this machine hear each other where no simulator passes their words on."""
+        if self.settings.simulated:
+            return []
+        port = ports.FIRST_FLEET_PORT + self.settings.instance_base
+        return ["--fleet-link", f"mcast://{ports.FLEET_GROUP}:{port}/127.0.0.1"]
+
     def _common_options(self, mission: Mission) -> list[str]:
         origin = mission.origin
         place = f"{origin.latitude_deg!r},{origin.longitude_deg!r},{origin.altitude_amsl_m!r}"
-        ports = ["--speed", f"{self.settings.speed:g}", "--instance-base", str(self.settings.instance_base)]
-        return [*ports, "--origin", place, "--supervised"]
+        shared = ["--speed", f"{self.settings.speed:g}", "--instance-base", str(self.settings.instance_base)]
+        return [*shared, "--origin", place, "--supervised"]
