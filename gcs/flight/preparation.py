@@ -15,7 +15,7 @@ from gcs.flight.fence import fence_items
 from gcs.flight.monitor import Phase, describe
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.command_client import CommandClient
-from gcs.microservices.mission_transfer_client import FENCE
+from gcs.microservices.mission_messages import FENCE
 from gcs.planner.plan import VehiclePlan
 from gcs.settings import PlanningMode
 from gcs.station import Station

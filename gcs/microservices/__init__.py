@@ -28,6 +28,10 @@ class Microservice(Protocol):
 
     def handle_timeout(self, now_s: float) -> list[Message]: ...
 
+    def abandon(self) -> list[Message]:
+        """What to send when the exchange is broken off before its end."""
+        ...
+
 
 class Backoff:
     """When to ask again: after `first_s`, then each time half as long again, at most `attempts` times."""

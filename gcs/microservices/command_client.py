@@ -63,6 +63,10 @@ class CommandClient:
     peer: tuple[int, int]
     done: bool = False
     deadline_s: float = math.inf
+    in_progress: bool = False
+    """The other side has said that it is at work."""
+    progress_percent: int | None = None
+    """How far, where it says so."""
     wants: frozenset[str] = frozenset({"COMMAND_ACK"})
     _confirmation: int = 0
     _backoff: Backoff = field(default_factory=lambda: Backoff(FIRST_TIMEOUT_S, ATTEMPTS))
@@ -75,6 +79,8 @@ class CommandClient:
         if message.command != self.command.number or self.done:
             return []
         if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
+            self.in_progress = True
+            self.progress_percent = message.progress if message.progress <= 100 else None
             self.deadline_s = now_s + PROGRESS_TIMEOUT_S
             return []
         self.done = True
@@ -89,6 +95,12 @@ class CommandClient:
             raise LinkLost(f"{self}: no answer to {self._confirmation + 1} requests")
         self._confirmation = min(self._confirmation + 1, 255)
         return self.start(now_s)
+
+    def abandon(self) -> list[Message]:
+        """A command that the other side is at work on is cancelled; any other has been obeyed, or was not heard."""
+        if not self.in_progress or self.done:
+            return []
+        return [mavlink.MAVLink_command_cancel_message(*self.peer, self.command.number)]
 
     def __str__(self) -> str:
         return f"vehicle {self.peer[0]}: {self.command.name}"

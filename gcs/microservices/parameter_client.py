@@ -61,6 +61,9 @@ class ParameterExchange:
             raise ParameterError(f"vehicle {self.peer[0]}: parameter {self.name}: {self._complaint()}")
         return self.start(now_s)
 
+    def abandon(self) -> list[Message]:
+        return []
+
     def _complaint(self) -> str:
         if self.value is None:
             return "no answer (an autopilot without this parameter is silent)"
