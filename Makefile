@@ -50,7 +50,7 @@ bench-sitl: $(VENV)/.installed-dev  ## what the simulator costs: CPU, memory, pa
 
 check-px4: install  ## fly the whole sequence on an autopilot that is there: make check-px4 LINK=udpin://0.0.0.0:14550
 	@test -n "$(LINK)" || { echo "usage: make check-px4 LINK=udpin://0.0.0.0:14550 [SPEED=1]"; exit 2; }
-	$(BIN)/gcs fly field --companions --headless --origin here --link $(LINK) --speed $(SPEED) --report out/check-px4
+	$(BIN)/gcs fly field --companions --sensor none --headless --origin here --link $(LINK) --speed $(SPEED) --report out/check-px4
 
 bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)

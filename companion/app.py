@@ -17,6 +17,7 @@ from companion.journal import Journal
 from companion.link.autopilot import Autopilot
 from companion.pilot import Pilot
 from companion.planner.planner import Plan, Planner, PlanRequest
+from companion.sensing.sensing import Sensing
 from companion.settings import CompanionSettings
 from companion.vehicle_clock import VehicleClock
 from missions import tunnel
@@ -51,6 +52,7 @@ class App:
         deadman: fed every tick while in control.
         faults: what an experimenter has ordered.
         journal: where decisions are written.
+        sensing: what the vehicle sees; None for one that sees nothing.
         cpu_clock: CPU time [s] of the thread in which a plan is made, for the figures alone.
     """
 
@@ -62,6 +64,7 @@ class App:
     deadman: DeadMan
     faults: FaultInjection
     journal: Journal
+    sensing: Sensing | None = None
     cpu_clock: Callable[[], float] = time.thread_time
 
     def __post_init__(self) -> None:
@@ -109,7 +112,10 @@ class App:
             event = await self.autopilot.receive()
             if isinstance(event, events.Odometry):
                 self._clock.observe(event.time_s, loop.time())
-            self._handle(event)
+            if self.sensing is not None:
+                notice(self.sensing, event, self._now_s)
+            if not isinstance(event, events.RingReported):
+                self._handle(event)
 
     async def _tick(self) -> None:
         loop = asyncio.get_running_loop()
@@ -118,12 +124,19 @@ class App:
             due_s = max(due_s + self.settings.pilot.tick_s / self._clock.pace, loop.time() - BEHIND_S)
             await asyncio.sleep(due_s - loop.time())
             late_s, age_s = loop.time() - due_s, self._clock.age_s(loop.time())
-            self._handle(events.Tick(odometry_age_s=age_s, lateness_ms=late_s * 1e3))
+            self._handle(events.Tick(age_s, lateness_ms=late_s * 1e3, sensor_silent=self._look()))
             if self.pilot.in_control:
                 self.deadman.feed()
             else:
                 self.deadman.disarm()
             self.faults.tick(in_control=self.pilot.in_control, now_s=self._now_s)
+
+    def _look(self) -> bool:
+        """Take in what the sensor has to say; whether it is silent."""
+        if self.sensing is None:
+            return False
+        self.sensing.look(self.pilot.briefing.frame, self._now_s)
+        return self.sensing.is_silent(self._now_s)
 
     async def _wait_for_stop(self) -> None:
         await self._stop.wait()
@@ -233,3 +246,16 @@ class App:
                     await self.autopilot.command_mode(FlightMode.HOLD)
             except (TimeoutError, CompanionError) as unheld:
                 self.journal.tell(f"the vehicle did not confirm Hold: {unheld}")
+
+
+def notice(sensing: Sensing, event: Event, now_s: float) -> None:
+    """What a vehicle reports, as far as it has to do with seeing."""
+    match event:
+        case events.Odometry():
+            sensing.observe(event.time_s, event.position_m, event.attitude)
+        case events.RingReported(fields_json):
+            sensing.receive(fields_json, now_s)
+        case events.OriginReported():
+            sensing.reframe()
+        case events.AutopilotLost():
+            sensing.forget()

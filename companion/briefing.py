@@ -52,6 +52,8 @@ class Briefing:
     downloaded_identity: int = 0
     problem: str = ""
     """Why the mission was not understood."""
+    sensor_silent: bool = False
+    """There is to be a range sensor, and it is not heard."""
     _order: FlightOrder | None = field(default=None, repr=False)
 
     def forget(self) -> None:
@@ -124,4 +126,6 @@ class Briefing:
             return Reason.NO_POSITION
         if not self.items:
             return Reason.NO_MISSION
-        return Reason.NONE if self._order is not None else Reason.MISSION_NOT_UNDERSTOOD
+        if self._order is None:
+            return Reason.MISSION_NOT_UNDERSTOOD
+        return Reason.NO_SENSOR if self.sensor_silent else Reason.NONE

@@ -6,6 +6,7 @@ import signal
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, TypeVar
 
@@ -18,15 +19,18 @@ from companion.errors import CompanionError, UsageError
 from companion.fault_injection import FaultInjection
 from companion.journal import Journal
 from companion.link.px4 import Px4
+from companion.link.sensor_port import SensorPort, parse_address
 from companion.pilot import Pilot
 from companion.planner.planner import Planner
+from companion.sensing.sensing import Driver, Sensing, driver_of
 from companion.settings import CompanionSettings, PlanningMode
 from companion.warm_up import warm_up
 from missions.errors import MissionError
 from missions.faults import EXAMPLES, Fault, parse_fault
 from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
-from missions.mission import Mission, load_mission
+from missions.lidar_packets import FIRST_PORT
+from missions.mission import Mission, SensorKind, load_mission
 from missions.ports import companion_port
 
 T = TypeVar("T")
@@ -47,6 +51,10 @@ def companion(
     instance_base: Annotated[
         int, typer.Option(min=0, max=LARGEST_INSTANCE_BASE, help="Shift the default port by this.")
     ] = 0,
+    sensor: Annotated[SensorKind, typer.Option(help="What the vehicle sees with.")] = SensorKind.LIDAR,
+    lidar: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Where the lidar's packets come in.", show_default=False)
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
     fault: Annotated[list[str] | None, typer.Option(help=f"Something that goes wrong, such as {EXAMPLES[0]}.")] = None,
     log: Annotated[Path | None, typer.Option(help="Write decisions to this file, one JSON object per line.")] = None,
@@ -64,9 +72,17 @@ def companion(
     |  companion --vehicle 1 --mission field --system udpin://0.0.0.0:14540 --origin 47.397,8.545,489
     """
     url = system or f"udpin://127.0.0.1:{companion_port(vehicle) + instance_base}"
+    heard_at = lidar or f"127.0.0.1:{FIRST_PORT + vehicle - 1 + instance_base}"
     try:
         settings = CompanionSettings(
-            vehicle=vehicle, system_url=url, speed=speed, mode=mode, seed=seed, deadman_s=deadman_s
+            vehicle=vehicle,
+            system_url=url,
+            speed=speed,
+            mode=mode,
+            seed=seed,
+            sensor=sensor,
+            lidar_address=heard_at,
+            deadman_s=deadman_s,
         )
         loaded = _mission(mission, origin, vehicle)
         faults = [parse_fault(text) for text in fault or []]
@@ -97,10 +113,12 @@ async def _fly(
     vehicle = mission.vehicle(settings.vehicle)
     zones_m = np.array([mission.start_m(vehicle), *(target.position_m for target in mission.targets)])
     planner = Planner(mission, settings.reserve, settings.search, np.random.default_rng(settings.seed), zones_m)
+    driver = driver_of(settings.sensor, mission)
     journal.tell("preparing the planner (a fresh machine compiles it once, which takes half a minute)")
     with one_at_a_time("companion"):
         warm_up(planner, mission, vehicle)
-    with ThreadPoolExecutor(1, thread_name_prefix="planner") as threads:
+    with ExitStack() as open_ports, ThreadPoolExecutor(1, thread_name_prefix="planner") as threads:
+        sensing = None if driver is None else _sensing(driver, settings, mission, open_ports)
         loop = asyncio.get_running_loop()
 
         async def work(call: Callable[[], T]) -> T:
@@ -110,11 +128,12 @@ async def _fly(
             settings,
             Pilot(mission, settings, planner),
             planner,
-            Px4(settings.vehicle, settings.system_url, journal.tell),
+            Px4(settings.vehicle, settings.system_url, journal.tell, ring_hz=_ring_hz(settings, mission)),
             work,
             KernelTimer(settings.deadman_s),
             FaultInjection(faults, settings.vehicle),
             journal,
+            sensing,
         )
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, companion.request_stop)
@@ -122,6 +141,23 @@ async def _fly(
             _end_with_parent(companion.request_stop)
         journal.tell(f"waiting for the autopilot on {settings.system_url}")
         return await companion.run()
+
+
+def _sensing(driver: Driver, settings: CompanionSettings, mission: Mission, open_ports: ExitStack) -> Sensing:
+    """The sensor as it is connected: a lidar by a port of its own, a ring by way of the autopilot.
+
+    Raises:
+        UsageError: the port cannot be bound.
+    """
+    rate_hz = mission.sensor.rate_hz
+    if settings.sensor is not SensorKind.LIDAR:
+        return Sensing(driver, rate_hz)
+    port = open_ports.enter_context(SensorPort(*parse_address(settings.lidar_address)))
+    return Sensing(driver, rate_hz, port.poll)
+
+
+def _ring_hz(settings: CompanionSettings, mission: Mission) -> float:
+    return mission.sensor.rate_hz if settings.sensor is SensorKind.OBSTACLE_DISTANCE else 0.0
 
 
 def _end_with_parent(request_stop: Callable[[], None]) -> None:

@@ -1,5 +1,6 @@
 """What can happen to a pilot: the one door in. Events are facts; the vehicle time goes along with them."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -43,13 +44,19 @@ class Odometry:
         time_s: vehicle time of the estimate.
         position_m: (3,) in the autopilot's NED frame.
         velocity_m_s: (3,) in the autopilot's NED frame.
-        yaw_rad: heading, 0 north, clockwise.
+        attitude: (4,) unit quaternion w, x, y, z, body FRD -> NED.
     """
 
     time_s: float
     position_m: Array
     velocity_m_s: Array
-    yaw_rad: float
+    attitude: Array
+
+    @property
+    def yaw_rad(self) -> float:
+        """Heading, 0 north, clockwise."""
+        w, x, y, z = self.attitude.tolist()
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 @dataclass(frozen=True)
@@ -147,6 +154,13 @@ class PlanReady:
 
 
 @dataclass(frozen=True)
+class RingReported:
+    """OBSTACLE_DISTANCE, its fields as JSON; for the sensor's driver."""
+
+    fields_json: bytes
+
+
+@dataclass(frozen=True)
 class StopRequested:
     """The program shall end: SIGTERM, Ctrl-C, or its parent is gone."""
 
@@ -158,10 +172,12 @@ class Tick:
     Args:
         odometry_age_s: vehicle time since the last odometry arrived.
         lateness_ms: by how much this tick came late (wall clock).
+        sensor_silent: there is to be a range sensor, and it is not heard.
     """
 
     odometry_age_s: float
     lateness_ms: float = 0.0
+    sensor_silent: bool = False
 
 
 Event = (
@@ -179,6 +195,7 @@ Event = (
     | StartCommanded
     | ModeCommandEnded
     | PlanReady
+    | RingReported
     | StopRequested
     | Tick
 )

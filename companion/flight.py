@@ -23,6 +23,8 @@ Array = npt.NDArray[np.float64]
 NEARLY_DONE_S = 2.0
 """A trajectory that reaches its target so soon is not replanned for its age."""
 PROGRESS_INTERVAL_S = 0.1
+BLIND = {Reason.NO_POSITION, Reason.NO_SENSOR}
+"""Whoever does not know where it is, or what is around, makes no plans."""
 
 
 class Flight:
@@ -81,17 +83,17 @@ class Flight:
         """Fly another track from the next plan on."""
         self._new_order, self._asked, self._retry_at_s = order, None, -np.inf
 
-    def tick(self, now_s: float, odometry_age_s: float) -> Iterator[Instruction]:
+    def tick(self, now_s: float, odometry_age_s: float, *, sensor_silent: bool = False) -> Iterator[Instruction]:
         """Stream on; look ahead; ask for a plan when there is a reason."""
         yield instructions.SendSetpoint(self.setpoint(now_s))
         if now_s - self._advanced_s >= PROGRESS_INTERVAL_S:
             self._advanced_s = now_s
             self.course.advance(now_s)
             yield from self._announce_progress()
-        trouble = self._trouble(now_s, odometry_age_s)
+        trouble = self._trouble(now_s, odometry_age_s, sensor_silent)
         if trouble is not Reason.NONE and self.holding is Reason.NONE:
             yield from self.brake(trouble, now_s)
-        if self._wants_plan(now_s) and odometry_age_s <= self._crew.settings.odometry_timeout_s:
+        if trouble not in BLIND and self._wants_plan(now_s):
             yield instructions.RequestPlan(self._request(now_s))
 
     def take(self, plan: Plan, cpu_ms: float, now_s: float) -> Iterator[Instruction]:
@@ -188,10 +190,12 @@ class Flight:
         ahead_m = frame.enu(np.array([place_ned_m, place_ned_m + odometry.velocity_m_s]))
         return Motion(ahead_m[0], ahead_m[1] - ahead_m[0], np.zeros(3))
 
-    def _trouble(self, now_s: float, odometry_age_s: float) -> Reason:
+    def _trouble(self, now_s: float, odometry_age_s: float, sensor_silent: bool) -> Reason:
         """Why the vehicle should not go on as it does."""
         if odometry_age_s > self._crew.settings.odometry_timeout_s:
             return Reason.NO_POSITION
+        if sensor_silent:
+            return Reason.NO_SENSOR
         if not self._crew.planner.is_clear(self.course.trajectory(now_s), now_s):
             return Reason.NO_PATH
         ended = self.is_at_rest(now_s) and not self.course.reaches_end

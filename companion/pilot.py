@@ -19,7 +19,8 @@ from companion.flight import Flight
 from companion.instructions import CommandResult, Instruction
 from companion.planner.planner import Plan, Planner
 from companion.settings import CompanionSettings
-from companion.states import NOT_READY, TRANSITIONS, UNDER_WAY, State
+from companion.start_answer import Situation, answer
+from companion.states import TRANSITIONS, UNDER_WAY, State
 from companion.status import StatusDesk
 from companion.utc_clock import UtcClock
 from companion.vehicle_clock import REBOOT_S
@@ -46,7 +47,7 @@ class Pilot:
         self._desk = StatusDesk(mission.digest, settings.pilot.status_interval_s)
         self._settings = settings.pilot
         self._crew = Crew(mission, planner, settings.pilot, settings.speed)
-        self._briefing = Briefing(mission, mission.vehicle(settings.vehicle), settings.mode)
+        self.briefing = Briefing(mission, mission.vehicle(settings.vehicle), settings.mode)
         self._connected = False
         self._odometry: events.Odometry | None = None
         self._mode = FlightMode.OTHER
@@ -97,7 +98,7 @@ class Pilot:
 
     def _report(self, now_s: float) -> list[Instruction]:
         """The status, if it is due."""
-        plan_id = self._flight.order.plan_id if self._flight is not None else self._briefing.plan_id
+        plan_id = self._flight.order.plan_id if self._flight is not None else self.briefing.plan_id
         status = self._desk.write(self.state, self.reason, plan_id, self._track_index, self.figures, now_s)
         return [] if status is None else [instructions.SendStatus(status)]
 
@@ -111,7 +112,7 @@ class Pilot:
     def _on_lost(self, _: events.AutopilotLost, now_s: float) -> Iterator[Instruction]:
         yield instructions.Note("autopilot lost", {"in_control": self.in_control})
         yield from self._end_control()
-        self._briefing.forget()
+        self.briefing.forget()
         self._connected, self._odometry, self._mode = False, None, FlightMode.OTHER
         self._enter(State.CONNECTING, Reason.AUTOPILOT_LOST)
 
@@ -126,19 +127,19 @@ class Pilot:
             self._settle()
 
     def _on_origin(self, event: events.OriginReported, now_s: float) -> Iterator[Instruction]:
-        if event.origin == self._briefing.origin:
+        if event.origin == self.briefing.origin:
             return
         yield instructions.Note("origin of the autopilot's frame", {"origin": str(event.origin)})
-        self._briefing.origin = event.origin
-        if self._flight is not None and self._briefing.frame is not None:
-            self._flight.reframe(self._briefing.frame)
+        self.briefing.origin = event.origin
+        if self._flight is not None and self.briefing.frame is not None:
+            self._flight.reframe(self.briefing.frame)
         self._rebrief()
 
     def _on_home(self, event: events.HomeReported, now_s: float) -> Iterator[Instruction]:
-        if self.in_control or event.home == self._briefing.home:
+        if self.in_control or event.home == self.briefing.home:
             return  # the ground offset does not change under a vehicle that is being flown
-        self._briefing.home = event.home
-        yield instructions.Note("home", {"ground_offset_m": round(self._briefing.ground_offset_m, 3)})
+        self.briefing.home = event.home
+        yield instructions.Note("home", {"ground_offset_m": round(self.briefing.ground_offset_m, 3)})
         self._rebrief()
 
     def _on_arming(self, event: events.ArmingReported, now_s: float) -> Iterator[Instruction]:
@@ -191,7 +192,7 @@ class Pilot:
     # --------------------------------------------------------------- the mission
 
     def _on_mission_reported(self, event: events.MissionReported, now_s: float) -> Iterator[Instruction]:
-        briefing = self._briefing
+        briefing = self.briefing
         briefing.current_seq = event.current_seq
         if event.identity != briefing.identity:
             briefing.identity = event.identity
@@ -201,9 +202,9 @@ class Pilot:
         yield from self._download(now_s)
 
     def _download(self, now_s: float) -> Iterator[Instruction]:
-        if self._briefing.wants_download and not self._downloading and now_s >= self._download_at_s:
+        if self.briefing.wants_download and not self._downloading and now_s >= self._download_at_s:
             self._downloading = True
-            yield instructions.DownloadMission(self._briefing.identity)
+            yield instructions.DownloadMission(self.briefing.identity)
 
     def _on_mission_downloaded(self, event: events.MissionDownloaded, now_s: float) -> Iterator[Instruction]:
         self._downloading = False
@@ -211,7 +212,7 @@ class Pilot:
             self._download_at_s = now_s + self._settings.command_retry_s
             yield instructions.Note("mission download failed")
             return
-        briefing = self._briefing
+        briefing = self.briefing
         briefing.accept(event.identity, event.items)
         yield instructions.Note("mission downloaded", {"plan_id": f"{briefing.plan_id:08x}", "items": len(event.items)})
         if briefing.problem:
@@ -220,7 +221,7 @@ class Pilot:
 
     def _rebrief(self) -> None:
         """The frame or the mission has changed."""
-        briefing = self._briefing
+        briefing = self.briefing
         if self._flight is None:
             briefing.decode()
             self._settle()
@@ -231,7 +232,7 @@ class Pilot:
         """Be ready, or wait for what is missing; flights, and what is left of them, are not disturbed."""
         resting = {State.FINISHED, State.RELEASED, State.HOLDING}
         over = self.state in resting and self._flight is None
-        fresh = self._briefing.plan_id != self._flown_plan_id
+        fresh = self.briefing.plan_id != self._flown_plan_id
         grounded = self.state is State.RELEASED and self._on_ground and not self._armed
         settling = self.state in {State.CONNECTING, State.WAITING, State.READY} or (over and (fresh or grounded))
         if not (self._connected and settling):
@@ -244,7 +245,7 @@ class Pilot:
     @property
     def _missing(self) -> Reason:
         """What keeps this vehicle from being flown; NONE when nothing does."""
-        return self._briefing.missing if self._odometry is not None else Reason.NO_POSITION
+        return self.briefing.missing if self._odometry is not None else Reason.NO_POSITION
 
     # ------------------------------------------------------------ start and stop
 
@@ -253,28 +254,23 @@ class Pilot:
         yield instructions.AcknowledgeStart(event.sender, result, reason)
         if result is not CommandResult.ACCEPTED or self.state in UNDER_WAY or self.in_control:
             return
-        order = self._briefing.order
+        order = self.briefing.order
         assert order is not None  # _answer has looked
         yield instructions.Note("start", {"plan_id": f"{order.plan_id:08x}", "mode": self._mode.value})
         self._flown_plan_id = order.plan_id
-        self._engagement = Engagement(self._crew, order, self._briefing.current_seq, self._mode, now_s)
+        self._engagement = Engagement(self._crew, order, self.briefing.current_seq, self._mode, now_s)
         self._enter(State.ENGAGING, Reason.NONE)
 
     def _answer(self, now_s: float) -> tuple[CommandResult, Reason]:
         """How a MISSION_START is to be answered now."""
-        if self._stopping:
-            return CommandResult.DENIED, Reason.STOPPED_BY_OPERATOR
-        if self.state in UNDER_WAY or self.in_control:
-            return CommandResult.ACCEPTED, Reason.NONE  # a repeated copy
-        if self.state in NOT_READY or self._briefing.order is None or self._odometry is None:
-            missing = self._missing if self._connected else Reason.AUTOPILOT_LOST
-            final = missing in {Reason.NO_MISSION, Reason.MISSION_NOT_UNDERSTOOD}
-            return (CommandResult.DENIED if final else CommandResult.TEMPORARILY_REJECTED), missing
-        if self._on_ground or not self._armed:
-            return CommandResult.TEMPORARILY_REJECTED, Reason.NOT_AIRBORNE
-        if now_s - self._released_at_s < self._settings.start_guard_s:
-            return CommandResult.TEMPORARILY_REJECTED, Reason.CONTROL_TAKEN
-        return CommandResult.ACCEPTED, Reason.NONE
+        situation = Situation(
+            stopping=self._stopping,
+            obeyed=self.state in UNDER_WAY or self.in_control,
+            missing=self._missing if self._connected else Reason.AUTOPILOT_LOST,
+            airborne=self._armed and not self._on_ground,
+            just_released=now_s - self._released_at_s < self._settings.start_guard_s,
+        )
+        return answer(situation)
 
     def _on_stop(self, _: events.StopRequested, now_s: float) -> Iterator[Instruction]:
         if self._stopping:
@@ -369,6 +365,10 @@ class Pilot:
 
     def _on_tick(self, event: events.Tick, now_s: float) -> Iterator[Instruction]:
         yield from self._download(now_s)
+        if event.sensor_silent is not self.briefing.sensor_silent:
+            self.briefing.sensor_silent = event.sensor_silent
+            yield instructions.Note("sensor silent" if event.sensor_silent else "sensor heard")
+            self._settle()
         if self._flight is not None:
             self.figures.lateness_max_ms = max(self.figures.lateness_max_ms, event.lateness_ms)
             yield from self._fly(self._flight, event, now_s)
@@ -376,7 +376,7 @@ class Pilot:
             yield from self._engage(self._engagement, now_s)
 
     def _fly(self, flight: Flight, event: events.Tick, now_s: float) -> Iterator[Instruction]:
-        yield from self._utc.stamped(flight.tick(now_s, event.odometry_age_s))
+        yield from self._utc.stamped(flight.tick(now_s, event.odometry_age_s, sensor_silent=event.sensor_silent))
         self._track_index = flight.track_index
         self._enter(State.FLYING if flight.holding is Reason.NONE else State.HOLDING, flight.holding)
         if self._leaving is not None:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from enum import Enum
 
+from missions.mission import SensorKind
+
 
 class PlanningMode(Enum):
     """Who plans, as chosen at the ground station."""
@@ -98,6 +100,9 @@ class CompanionSettings:
     speed: float = 1.0
     mode: PlanningMode = PlanningMode.END_CLOUD
     seed: int = 0
+    sensor: SensorKind = SensorKind.LIDAR
+    lidar_address: str = "127.0.0.1:56300"
+    """HOST:PORT at which the lidar's packets come in."""
     deadman_s: float = 0.5
     reserve: Reserve = field(default_factory=Reserve)
     search: SearchSettings = field(default_factory=SearchSettings)

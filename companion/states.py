@@ -20,6 +20,5 @@ TRANSITIONS: dict[State, frozenset[State]] = {
 }
 """Where a state may lead, besides CONNECTING (the autopilot is lost) and FAILED (an error of our own)."""
 
-NOT_READY = frozenset({State.CONNECTING, State.WAITING, State.FAILED})
 UNDER_WAY = frozenset({State.ENGAGING, State.FLYING, State.LANDING})
 """A MISSION_START in these has been obeyed already."""

@@ -20,6 +20,8 @@ FIRST_PORT = 56300
 """Where the first vehicle's companion hears its lidar; the others' follow."""
 POINTS_PER_PACKET = 96
 """As the device: a datagram stays below an Ethernet frame."""
+MOUNT_FLU_M = np.array([0.0, 0.0, 0.1])
+"""Where the device sits on a vehicle, and is told to sit: the origin of its rays, from the vehicle's centre."""
 CARTESIAN_MM = 1
 """The header's data_type."""
 _HEADER = struct.Struct("<BHHHHBBB12xIQ")

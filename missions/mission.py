@@ -133,6 +133,17 @@ class OnboardSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     voxel_m: Positive = 0.1
 
 
+class SensorKind(Enum):
+    """What a vehicle sees with."""
+
+    LIDAR = "lidar"
+    """Points in datagrams of their own."""
+    OBSTACLE_DISTANCE = "obstacle-distance"
+    """A ring of distances, by way of the autopilot."""
+    NONE = "none"
+    """Nothing: it flies by the mission's map alone."""
+
+
 class RangeSensor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The companion's range sensor: a lidar, or a depth camera looking forward."""
 
@@ -142,6 +153,8 @@ class RangeSensor(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     rate_hz: Positive = 10.0
     noise_m: NotNegative = 0.02
     dropout: Share = 0.02
+    spacing_deg: Annotated[float, msgspec.Meta(ge=0.2, le=30.0)] = 3.0
+    """Between neighbouring rays of one scan, as the simulator casts them."""
 
 
 class Positioning(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -70,6 +70,8 @@ class Reason(IntEnum):
     INTERNAL_ERROR = 10
     NOT_AIRBORNE = 11
     """On the ground or disarmed: companions take over from hovering."""
+    NO_SENSOR = 12
+    """The range sensor is not heard: whoever cannot see does not move."""
 
 
 class TrajectoryMessage(msgspec.Struct, frozen=True, kw_only=True):

@@ -75,8 +75,12 @@ def fly(
         ),
     ] = None,
     lidar: Annotated[
-        bool, typer.Option("--lidar", help="Send the companions what the mission's range sensor sees.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--lidar/--no-lidar",
+            help="Send the companions what the mission's range sensor sees; on open ground not unless asked for.",
+        ),
+    ] = None,
     supervised: Annotated[bool, typer.Option("--supervised", help="End when standard input does.")] = False,
 ) -> None:
     """Simulate the vehicles of a mission, each an autopilot with PX4's manners on two UDP ports.
@@ -88,9 +92,12 @@ def fly(
     if (mission is None) == (vehicles is None):
         raise typer.BadParameter("expected a MISSION or --vehicles, one of the two")
     onboard_port, first_companion_port = _ports(onboard_ports) if onboard_ports else (ONBOARD_PORT, None)
+    lidar = vehicles is None if lidar is None else lidar
     if lidar and instance_base > HIGHEST_INSTANCE_BASE_WITH_LIDAR:
         highest = HIGHEST_INSTANCE_BASE_WITH_LIDAR
-        raise typer.BadParameter(f"--instance-base: expected at most {highest} with --lidar, found {instance_base}")
+        raise typer.BadParameter(
+            f"--instance-base: expected at most {highest} without --no-lidar, found {instance_base}"
+        )
     try:
         settings = Settings(
             speed=speed,

@@ -62,12 +62,11 @@ class OdometryMessage(msgspec.Struct, frozen=True):
         if (self.frame_id, self.child_frame_id) != (MAV_FRAME_LOCAL_NED, MAV_FRAME_LOCAL_NED):
             frames = f"{self.frame_id} and {self.child_frame_id}"
             raise ValueError(f"ODOMETRY: expected position and velocity in frame {MAV_FRAME_LOCAL_NED}, found {frames}")
-        w, x, y, z = self.q
         return Odometry(
             time_s=self.time_usec / 1e6,
             position_m=np.array([self.x, self.y, self.z]),
             velocity_m_s=np.array([self.vx, self.vy, self.vz]),
-            yaw_rad=float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))),
+            attitude=np.array(self.q),
         )
 
 

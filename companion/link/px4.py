@@ -27,7 +27,15 @@ from mavsdk.plugins.offboard import AccelerationNed, Offboard, PositionNedYaw, V
 from mavsdk.system import System
 
 from companion.errors import CommandRefused, UsageError
-from companion.events import AutopilotFound, AutopilotLost, Event, FlightMode, Sender, StartCommanded
+from companion.events import (
+    AutopilotFound,
+    AutopilotLost,
+    Event,
+    FlightMode,
+    RingReported,
+    Sender,
+    StartCommanded,
+)
 from companion.instructions import CommandResult
 from companion.link.messages import EVENTS_OF, CommandAck, CommandLong, OdometryMessage
 from companion.setpoints import Setpoint
@@ -43,6 +51,7 @@ SETUP_RETRY_S = 2.0
 
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, MISSION_START = 511, 512, 300
 GPS_GLOBAL_ORIGIN = 49
+OBSTACLE_DISTANCE = 330
 RATES_HZ = {331: 30.0, 436: 10.0, 245: 5.0, 42: 5.0, 2: 1.0, 242: 1.0}
 """Of ODOMETRY, CURRENT_MODE, EXTENDED_SYS_STATE, MISSION_CURRENT (a PX4 keeps its own), SYSTEM_TIME, HOME_POSITION."""
 
@@ -54,9 +63,11 @@ class Px4:
         sysid: of the vehicle; the companion is `sysid`/191.
         url: where it is heard, as MAVSDK writes it.
         complain: told of what MAVSDK itself finds wrong, once per text.
+        ring_hz: how often OBSTACLE_DISTANCE is wanted; not at all for 0.
     """
 
-    def __init__(self, sysid: int, url: str, complain: Callable[[str], None]) -> None:
+    def __init__(self, sysid: int, url: str, complain: Callable[[str], None], ring_hz: float = 0.0) -> None:
+        self._rates_hz = RATES_HZ | ({OBSTACLE_DISTANCE: ring_hz} if ring_hz > 0.0 else {})
         self._sysid = sysid
         self._url = url
         self._complain = complain
@@ -115,6 +126,8 @@ class Px4:
         self._system = system
         self._action, self._mission = Action(system), MissionRaw(system)
         direct.subscribe_message("ODOMETRY", lambda message, _: self._soon(self._on_odometry, message))
+        if OBSTACLE_DISTANCE in self._rates_hz:
+            direct.subscribe_message("OBSTACLE_DISTANCE", lambda message, _: self._soon(self._on_ring, message))
         for name in EVENTS_OF:
             direct.subscribe_message(name, lambda message, _: self._soon(self._on_message, message))
         system.subscribe_is_connected(lambda connected, _: self._soon(self._on_connected, connected))
@@ -131,7 +144,7 @@ class Px4:
         """Ask until the origin is known: the autopilot may still be booting."""
         self._has_origin = False
         while not self._has_origin:
-            for message_id, rate_hz in RATES_HZ.items():
+            for message_id, rate_hz in self._rates_hz.items():
                 await self._command(SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
             await self._command(REQUEST_MESSAGE, GPS_GLOBAL_ORIGIN)
             await asyncio.sleep(SETUP_RETRY_S)
@@ -160,6 +173,9 @@ class Px4:
                 self._loop.create_task(self._command(REQUEST_MESSAGE, GPS_GLOBAL_ORIGIN))
             for event in self._read(message, lambda _, odometry=odometry: [odometry.event()]):
                 self._events.put_nowait(event)
+
+    def _on_ring(self, message: MavlinkMessage) -> None:
+        self._events.put_nowait(RingReported(message.fields_json.encode()))
 
     def _on_command(self, message: MavlinkMessage) -> None:
         for command in self._read(message, lambda fields: [msgspec.json.decode(fields, type=CommandLong)]):

@@ -70,8 +70,9 @@ def evaluate(x: Array, problem: LocalProblem, value: Array) -> float:
     goal_m = reference.samples[len(motion) - 1]
     lay_out(x, problem.start, goal_m, knot_s, problem.fitted_m, problem.layout, control)
     trace(control, knot_s, problem.rows, motion)
-    free_space(motion, problem.around.obstacles, free_m)
-    lacking(motion, free_m, problem.around, problem.ends, limits, lacking_m)
+    step_s = knot_s * (len(control) - 3) / (len(motion) - 1)
+    free_space(motion, step_s, problem.around, free_m)
+    lacking(motion, free_m, step_s, problem.around, problem.ends, limits, lacking_m)
     value[HARD] = value[SOFT] = 0.0
     for k in range(1, len(motion)):
         value[HARD] += lacking_m[k] / limits.clearance_m

@@ -58,8 +58,8 @@ def way_around(
 def speeds_at(points_m: Array, margin_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> Array:
     """(m,) speeds [m/s] that are allowed at (m, 3) points; BLOCKED where clearance (less a margin) or height lacks."""
     free_m, lacking_m = np.empty(len(points_m)), np.empty(len(points_m))
-    free_space(points_m, around.obstacles, free_m)
-    lacking(points_m, free_m - margin_m, around, ends, limits, lacking_m)
+    free_space(points_m, 0.0, around, free_m)
+    lacking(points_m, free_m - margin_m, 0.0, around, ends, limits, lacking_m)
     slow = free_m < limits.avoidance_distance_m
     return np.where(lacking_m > 0.0, BLOCKED, np.where(slow, limits.avoidance_m_s, limits.cruise_m_s))
 

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from companion.mapping.distance_field import Field, distance_at, no_field
+from companion.planner.traffic import Traffic, crowding, mover_clearance, no_traffic
 from companion.settings import Reserve
 from missions.kernels import compiled
 from missions.mission import Mission, Site
@@ -44,13 +46,17 @@ class FlightLimits(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """Where a vehicle may be, as far as it is known; the place to add the distance field of what a sensor sees."""
+    """Where a vehicle may be, as far as it is known and seen."""
 
     obstacles: Obstacles
     room_m: Array
     """(2, 3) lowest and highest corner of the flight range, ENU."""
     zones_m: Array
     """(z, 4) centre and radius of launch zones: around the start of the mission and its target."""
+    field: Field
+    """What was seen."""
+    moving: Traffic
+    """Movers and neighbours, from the beginning of the plan on."""
 
 
 EAST, NORTH, UP, END_CLEARANCE, END_HEIGHT, END_OUTSIDE = range(6)
@@ -95,7 +101,7 @@ def surroundings(mission: Mission, obstacles: Obstacles, zones_m: Array) -> Surr
     room_m = np.array([bounds.low_enu_m, bounds.high_enu_m], dtype=float)
     centres_m = np.asarray(zones_m, dtype=float).reshape(-1, 3)
     radius_m = np.full((len(centres_m), 1), mission.launch_zone_radius_m)
-    return Surroundings(obstacles, room_m, np.hstack((centres_m, radius_m)))
+    return Surroundings(obstacles, room_m, np.hstack((centres_m, radius_m)), no_field(), no_traffic())
 
 
 @compiled
@@ -109,7 +115,9 @@ def ends_of(start_m: Array, goal_m: Array, around: Surroundings, limits: FlightL
         ends[0, axis], ends[1, axis] = start_m[axis], goal_m[axis]
     for i in range(2):
         east, north, up = ends[i, 0], ends[i, 1], ends[i, 2]
-        ends[i, END_CLEARANCE] = clearance_at(east, north, up, around.obstacles) - ROUNDING_M
+        ends[i, END_CLEARANCE] = free_at(east, north, up, around) - ROUNDING_M
+        if i == 0:
+            ends[i, END_CLEARANCE] = min(ends[i, END_CLEARANCE], mover_clearance(east, north, up, 0.0, around.moving))
         ends[i, END_HEIGHT] = up - terrain_height_at(east, north, around.obstacles) - ROUNDING_M
         ends[i, END_OUTSIDE] = outside(ends, i, around.room_m) + ROUNDING_M
     ends[1, END_CLEARANCE] = max(ends[1, END_CLEARANCE], limits.contact_m)
@@ -119,9 +127,15 @@ def ends_of(start_m: Array, goal_m: Array, around: Surroundings, limits: FlightL
 
 @compiled
 def lacking(
-    points_m: Array, free_m: Array, around: Surroundings, ends: Array, limits: FlightLimits, out: Array
+    points_m: Array,
+    free_m: Array,
+    step_s: float,
+    around: Surroundings,
+    ends: Array,
+    limits: FlightLimits,
+    out: Array,
 ) -> None:
-    """How much each point lacks of the clearance, the height and the flight range that are required of it.
+    """How much each point lacks of the clearance, height, flight range and separation that are required of it.
 
     What is required is eased near the ends: who stands too near to a wall may leave along it, instead of freezing.
     Nobody is eased into touching something, or out of the flight range.
@@ -129,6 +143,7 @@ def lacking(
     Args:
         points_m: (m, 3 or more) ENU [m]; further columns are not read.
         free_m: (m,) clearance of each point.
+        step_s: time from one point to the next, for what moves.
         around: terrain, flight range and launch zones.
         ends: (2, 6) of the plan.
         limits: what is required.
@@ -137,10 +152,10 @@ def lacking(
     obstacles, zones_m, room_m, eased = around.obstacles, around.zones_m, around.room_m, is_eased(ends, limits)
     for i in range(len(points_m)):
         east, north, up = points_m[i, 0], points_m[i, 1], points_m[i, 2]
-        clearance_m, height_m, allowed_m = limits.clearance_m, limits.height_m, 0.0
+        clearance_m, height_m, allowed_m, in_zone = limits.clearance_m, limits.height_m, 0.0, False
         for z in range(len(zones_m)):
             if is_within(east - zones_m[z, 0], north - zones_m[z, 1], up - zones_m[z, 2], zones_m[z, 3]):
-                clearance_m, height_m = limits.contact_m, 0.0
+                clearance_m, height_m, in_zone = limits.contact_m, 0.0, True
         if eased:
             for e in range(2):
                 eased_m = EASING * span(east - ends[e, EAST], north - ends[e, NORTH], up - ends[e, UP])
@@ -151,6 +166,7 @@ def lacking(
         ground_m = terrain_height_at(east, north, obstacles) if len(obstacles.peaks) > 0 else 0.0
         out[i] = max(clearance_m - free_m[i], 0.0) + max(height_m - (up - ground_m), 0.0)
         out[i] += max(outside(points_m, i, room_m) - allowed_m, 0.0)
+        out[i] += crowding(east, north, up, i * step_s, in_zone, around.moving)
 
 
 @compiled
@@ -164,10 +180,20 @@ def is_eased(ends: Array, limits: FlightLimits) -> bool:
 
 
 @compiled
-def free_space(points_m: Array, obstacles: Obstacles, out: Array) -> None:
-    """Fill `out` (m,) with the clearance of (m, 3 or more) points [m]; further columns are not read."""
+def free_at(east: float, north: float, up: float, around: Surroundings) -> float:
+    """Distance [m] from a place to what stands, whether it is known or was seen."""
+    return min(clearance_at(east, north, up, around.obstacles), distance_at(east, north, up, around.field))
+
+
+@compiled
+def free_space(points_m: Array, step_s: float, around: Surroundings, out: Array) -> None:
+    """Fill `out` (m,) with the clearance of (m, 3 or more) points, `step_s` apart in time [m]."""
+    among_movers = len(around.moving.bodies) > 0
     for i in range(len(points_m)):
-        out[i] = clearance_at(points_m[i, 0], points_m[i, 1], points_m[i, 2], obstacles)
+        east, north, up = points_m[i, 0], points_m[i, 1], points_m[i, 2]
+        out[i] = free_at(east, north, up, around)
+        if among_movers:
+            out[i] = min(out[i], mover_clearance(east, north, up, i * step_s, around.moving))
 
 
 @compiled

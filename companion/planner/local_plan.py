@@ -125,7 +125,7 @@ class LocalPlanner:
         return to_m, reference
 
     def _reference(self, way: Way, from_m: float, to_m: float, start: Array) -> Reference:
-        return lay_reference(way, from_m, to_m, start, self.shape.n_samples, self.limits, self.around.obstacles)
+        return lay_reference(way, from_m, to_m, start, self.shape.n_samples, self.limits, self.around)
 
     def _resting_place(self, way: Way, from_m: float, reach_m: float) -> float:
         """Arc [m] of the farthest sample within reach that is clear enough to rest there; the way's end always is."""
@@ -133,7 +133,7 @@ class LocalPlanner:
             return float(way.arc_m[-1])
         first, after = np.searchsorted(way.arc_m, (from_m, from_m + reach_m), side="right")
         free_m = np.empty(after - first)
-        free_space(way.samples[first:after], self.around.obstacles, free_m)
+        free_space(way.samples[first:after], 0.0, self.around, free_m)
         clear = np.flatnonzero(free_m >= self.limits.clearance_m)
         return float(way.arc_m[first + clear[-1]]) if len(clear) else from_m + reach_m
 

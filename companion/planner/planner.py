@@ -5,15 +5,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from companion.fleet.neighbour import Neighbour
+from companion.mapping.local_map import LocalMap, View
+from companion.mapping.sorting import Known
 from companion.planner.braking import brake_along
 from companion.planner.dominance import objective_weights
 from companion.planner.evaluation import HARD
 from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around
-from companion.planner.limits import flight_limits, surroundings
+from companion.planner.limits import Surroundings, flight_limits, surroundings
 from companion.planner.local_plan import Horizon, LocalPlanner
 from companion.planner.reference import LEG_SPEED, Way
 from companion.planner.safety import worst_lack
 from companion.planner.spline_shape import spline_shape
+from companion.planner.traffic import traffic
+from companion.sensing.scan import Scan
 from companion.settings import Reserve, SearchSettings
 from missions import obstacles
 from missions.mission import Mission
@@ -24,6 +29,12 @@ from missions.trajectory import Motion, Trajectory
 Array = npt.NDArray[np.float64]
 
 CELLS_PER_VOXEL = 2.0
+KNOWN_WITHIN_VOXELS = 2.0
+"""What is seen so near to a known surface is that surface."""
+REACH_FARTHER = 1.05
+"""The map knows distances a little beyond what is asked for."""
+SLOWEST_SCALE = 2.5
+"""No plan takes longer than this multiple of its reference."""
 LONGEST_DURATION = 2.2
 """A plan lasts no longer than so many times the horizon at cruise speed: its knots stay close together."""
 
@@ -39,6 +50,7 @@ class PlanRequest:
         guide: what is followed.
         arc_m: how much of the guide is done.
         committed: the trajectory being flown, to begin the search with.
+        neighbours: other vehicles to keep away from.
     """
 
     number: int
@@ -47,6 +59,7 @@ class PlanRequest:
     guide: Guide
     arc_m: float
     committed: Trajectory | None = None
+    neighbours: tuple[Neighbour, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -94,7 +107,18 @@ class Planner:
             search,
             objective_weights(phi.length_weight, phi.clearance_weight, phi.height_weight),
         )
-        self._rng = rng
+        self._rng, self._mission_limits = rng, mission.limits
+        self._map = LocalMap(
+            Known(
+                self.around.obstacles,
+                self.around.room_m,
+                KNOWN_WITHIN_VOXELS * mission.onboard.voxel_m,
+                self.limits.clearance_m,
+            ),
+            mission.onboard.voxel_m,
+            REACH_FARTHER * max(self.limits.avoidance_distance_m, self.limits.clearance_m),
+            mission.limits.body_radius_m,
+        )
         self.cell_m = CELLS_PER_VOXEL * mission.onboard.voxel_m
 
     @property
@@ -105,28 +129,58 @@ class Planner:
         """The guide from a place along the rest of a track, not yet led around anything."""
         return lay_guide(track, index, from_m, self.horizon_m, self.limits)
 
+    def observe(self, scan: Scan, neighbours: tuple[Neighbour, ...] = ()) -> None:
+        """Take a scan into the map. One thread at a time may plan or observe; `is_clear` may be asked by another.
+
+        Args:
+            scan: what was seen.
+            neighbours: vehicles that say where they are: they are not mapped.
+        """
+        bodies = [(*other.trajectory.at(scan.time_s).position_m, other.radius_m) for other in neighbours]
+        self._map.observe(scan, np.array(bodies, dtype=float).reshape(-1, 4))
+
+    @property
+    def seen(self) -> View:
+        """What the map holds now; never changed."""
+        return self._map.view
+
     def plan(self, request: PlanRequest) -> Plan:
         """Plan along the request's guide, which is first led around what blocks it."""
-        guide = lead_around(request.guide, self.around, self.limits, self.horizon_m, self.cell_m)
+        around = self._around(request.start.position_m, request.start_s, request.neighbours)
+        guide = lead_around(request.guide, around, self.limits, self.horizon_m, self.cell_m)
         if guide is None or guide is request.guide:  # without a way around, as far as it goes
-            return self._plan_along(request, request.guide, request.arc_m)
+            return self._plan_along(request, request.guide, request.arc_m, around)
         from_m = max(request.arc_m - self.horizon_m, 0.0)
-        return self._plan_along(request, guide, guide.project(request.start.position_m, from_m, 2.0 * self.horizon_m))
+        arc_m = guide.project(request.start.position_m, from_m, 2.0 * self.horizon_m)
+        return self._plan_along(request, guide, arc_m, around)
 
-    def is_clear(self, trajectory: Trajectory, now_s: float) -> bool:
-        """The rest of a committed trajectory keeps what the mission requires (the reserve is not asked for)."""
+    def is_clear(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> bool:
+        """The rest of a trajectory keeps what the mission requires (the reserve is not asked for).
+
+        It is judged against what is known, what was seen until now, movers as they are expected, and the neighbours'
+        trajectories. May be asked in another thread than plans are made in.
+        """
+        begin_s = max(now_s, trajectory.start_s)
+        around = self._around(trajectory.at(begin_s).position_m, begin_s, neighbours)
         done = min(max(now_s - trajectory.start_s, 0.0), trajectory.duration_s) / trajectory.knot_interval_s
-        return worst_lack(trajectory.control_points_m, done, self._required, self.around) == 0.0
+        control_m, knot_s = trajectory.control_points_m, trajectory.knot_interval_s
+        return worst_lack(control_m, knot_s, done, self._required, around) == 0.0
+
+    def _around(self, place_m: Array, begin_s: float, neighbours: tuple[Neighbour, ...]) -> Surroundings:
+        """Everything around a vehicle that is at a place at a time."""
+        view, longest_s = self._map.view, SLOWEST_SCALE * self._local.horizon.duration_s
+        moving = traffic(view.movers, neighbours, self._mission_limits, begin_s, longest_s, place_m)
+        return self.around._replace(field=view.field, moving=moving)
 
     def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
         """Come to rest on the committed path as soon as the limits allow."""
         return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)
 
-    def _plan_along(self, request: PlanRequest, guide: Guide, arc_m: float) -> Plan:
+    def _plan_along(self, request: PlanRequest, guide: Guide, arc_m: float, around: Surroundings) -> Plan:
         warm = None if request.committed is None else self._warm_way(request, request.committed, guide, arc_m)
-        plan = self._local.plan(guide.way, arc_m, np.array(request.start), warm, self._rng)
+        plan = replace(self._local, around=around).plan(guide.way, arc_m, np.array(request.start), warm, self._rng)
         trajectory = Trajectory(plan.control_m, request.start_s, plan.knot_s)
-        if plan.value[HARD] > 0.0 or not self.is_clear(trajectory, request.start_s):
+        if plan.value[HARD] > 0.0 or not self.is_clear(trajectory, request.start_s, request.neighbours):
             return Plan(request, None, guide, arc_m)
         return Plan(request, trajectory, guide, arc_m, plan.goal_arc_m >= guide.length_m)
 

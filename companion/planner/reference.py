@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from companion.planner.limits import FlightLimits, span, speed_limit
+from companion.planner.limits import FlightLimits, Surroundings, free_at, span, speed_limit
 from missions.kernels import compiled
-from missions.obstacles import Obstacles, clearance_at
 
 Array = npt.NDArray[np.float64]
 
@@ -66,7 +65,7 @@ def lay_reference(
     start: Array,
     n_samples: int,
     limits: FlightLimits,
-    obstacles: Obstacles,
+    around: Surroundings,
 ) -> Reference:
     """Time the piece of `way` between two arcs, entered from a state.
 
@@ -77,14 +76,14 @@ def lay_reference(
         start: (3, 3) position, velocity, acceleration; the offset from the way fades out along it.
         n_samples: K + 1.
         limits: of speed and acceleration.
-        obstacles: what the speed rule looks at.
+        around: what the speed rule looks at.
     """
     path, aims = np.empty((PATH_SAMPLES, 5)), np.empty(PATH_SAMPLES)
     arc, times = np.zeros(PATH_SAMPLES), np.zeros(PATH_SAMPLES)
     follow(way, from_m, to_m, start, path)
-    keep_off(path, limits, obstacles)
+    keep_off(path, limits, around)
     for j in range(PATH_SAMPLES):
-        free_m = clearance_at(path[j, 0], path[j, 1], path[j, 2], obstacles)
+        free_m = free_at(path[j, 0], path[j, 1], path[j, 2], around)
         aims[j] = min(path[j, LEG_SPEED], speed_limit(free_m, limits) * limits.nominal_ratio)
         if j > 0:
             arc[j] = arc[j - 1] + apart(path, j, j - 1)
@@ -122,7 +121,7 @@ def follow(way: Way, from_m: float, to_m: float, start: Array, path: Array) -> N
 
 
 @compiled
-def keep_off(path: Array, limits: FlightLimits, obstacles: Obstacles) -> None:
+def keep_off(path: Array, limits: FlightLimits, around: Surroundings) -> None:
     """Push a path (n, 5) out to the avoidance distance where it lacks less of it than the corridor is wide.
 
     Passing an obstacle a little farther off at full speed is better than passing it slowly.
@@ -131,12 +130,12 @@ def keep_off(path: Array, limits: FlightLimits, obstacles: Obstacles) -> None:
     pushed, moved = np.zeros((n, 3)), path.copy()
     for _ in range(PUSHES):
         for j in range(1, n - 1):
-            free_m = clearance_at(moved[j, 0], moved[j, 1], moved[j, 2], obstacles)
+            free_m = free_at(moved[j, 0], moved[j, 1], moved[j, 2], around)
             lack_m = limits.avoidance_distance_m + PUSHED_FARTHER_M - free_m
             if 0.0 < lack_m < path[j, CORRIDOR]:
                 for axis in range(3):
                     moved[j, axis] += PROBE_M
-                    slope = (clearance_at(moved[j, 0], moved[j, 1], moved[j, 2], obstacles) - free_m) / PROBE_M
+                    slope = (free_at(moved[j, 0], moved[j, 1], moved[j, 2], around) - free_m) / PROBE_M
                     moved[j, axis] -= PROBE_M
                     pushed[j, axis] += slope * lack_m
         for axis in range(3):

@@ -14,18 +14,14 @@ import numpy.typing as npt
 
 from missions import lidar_packets, obstacles
 from missions.frames import swap_enu_ned
-from missions.lidar_packets import POINTS_PER_PACKET, LidarPacket
+from missions.lidar_packets import MOUNT_FLU_M, POINTS_PER_PACKET, LidarPacket
 from missions.mission import Mission, RangeSensor
 from sitl.sensors.ray_casting import cast_rays
 
 Array = npt.NDArray[np.float64]
 
-SPACING_RAD = math.radians(3.0)
-"""Between neighbouring rays."""
 SECTORS = 72
 SECTOR_RAD = 2.0 * math.pi / SECTORS
-MOUNT_FLU_M = np.array([0.0, 0.0, 0.1])
-"""Where the sensor is on the vehicle."""
 LEVEL_RAD = math.radians(10.0)
 """Rays this near to the plane of the body count for the distances around."""
 
@@ -104,7 +100,7 @@ class RangeSensors:
 def ray_grid(sensor: RangeSensor, turn: Array) -> Array:
     """(n, 3) unit vectors FLU that fill the field of view, the grid shifted by `turn` in [0, 1)^2 cells."""
     horizontal, vertical = math.radians(sensor.horizontal_deg), math.radians(sensor.vertical_deg)
-    columns, rows = math.ceil(horizontal / SPACING_RAD), math.ceil(vertical / SPACING_RAD)
+    columns, rows = (math.ceil(angle / math.radians(sensor.spacing_deg)) for angle in (horizontal, vertical))
     azimuth = horizontal * ((np.arange(columns) + turn[0]) / columns - 0.5)
     elevation = vertical * ((np.arange(rows) + turn[1]) / rows - 0.5)
     azimuth, elevation = (grid.ravel() for grid in np.meshgrid(azimuth, elevation))

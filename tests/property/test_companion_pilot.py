@@ -8,7 +8,7 @@ from companion import events, instructions
 from companion.events import FlightMode
 from companion.states import TRANSITIONS, State
 from missions.mission_items import MissionItem
-from tests.unit.companion.rig import GCS, HOME, Rig, items_of, moved, of, with_home
+from tests.unit.companion.rig import GCS, HOME, LEVEL, Rig, items_of, moved, of, with_home
 
 ACTING = (instructions.SendSetpoint, instructions.CommandMode)
 MODES = st.sampled_from(list(FlightMode))
@@ -59,7 +59,7 @@ class Story:
             case "odometry":
                 out = rig.feed(rig.odometry())
             case "odometry far away":
-                out = rig.feed(events.Odometry(rig.now_s, np.array([50.0, 9.0, -3.0]), np.zeros(3), 0.0))
+                out = rig.feed(events.Odometry(rig.now_s, np.array([50.0, 9.0, -3.0]), np.zeros(3), LEVEL))
             case "second":
                 out = rig.run(1.0)
             case "answer":

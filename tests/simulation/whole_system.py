@@ -47,6 +47,10 @@ PLANNING_TIME_S = 0.01
 """A companion's plan takes so long in vehicle time; it is made at once, so that no run depends on the machine."""
 
 
+CLOUD_PLANNING_TIME_S = 0.2
+"""Likewise a plan of the cloud's."""
+
+
 class Died(BaseException):
     """A fault has ended a companion; no `except Exception` of the companion's may catch it."""
 
@@ -79,8 +83,11 @@ class GroundWire:
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
+        self.bytes = 0
+        """Sent and received by the station."""
 
     def send(self, datagram: bytes, address: tuple[str, int]) -> None:
+        self.bytes += len(datagram)
         self._simulator.receive(address[1], Link.GROUND, datagram)
 
 
@@ -92,6 +99,7 @@ class WholeSystem:
         mission: what is flown.
         mode: who plans.
         seed: of planner and simulator.
+        truth_mission: what the simulator has of the world; the mission, unless that is wrong about it.
     """
 
     mission: Mission
@@ -101,9 +109,10 @@ class WholeSystem:
     """(time [s], positions (n, 3), velocities (n, 3)) of every tick."""
 
     faults: tuple[Fault, ...] = ()
+    truth_mission: Mission | None = None
 
     def __post_init__(self) -> None:
-        self.simulator = Simulator(self.mission, seed=self.seed)
+        self.simulator = Simulator(self.truth_mission or self.mission, seed=self.seed)
         self.station = Station(unix_us=lambda: 0)
         self.wire = GroundWire(self.simulator)
         self.station.connections.append(self.wire)
@@ -149,7 +158,9 @@ class WholeSystem:
         }
 
     async def _plan(self, mission: Mission) -> FleetPlan:
-        return planned(msgspec.json.encode(mission), self.seed)
+        plan = planned(msgspec.json.encode(mission), self.seed)
+        await asyncio.sleep(CLOUD_PLANNING_TIME_S)
+        return plan
 
     async def _companion(self, vehicle: Vehicle) -> None:
         """One companion, until it is cancelled or a fault ends it."""
@@ -185,6 +196,7 @@ class WholeSystem:
             self.truth.append((truth.time_s, truth.position_enu_m, truth.velocity_enu_m_s))
             for sysid, link, frame in self.simulator.transmissions():
                 if link is Link.GROUND:
+                    self.wire.bytes += len(frame)
                     self.station.receive(self.wire, frame, ("simulator", sysid))
                 elif sysid in self.autopilots:
                     self.autopilots[sysid].receive_frame(frame)

@@ -21,6 +21,8 @@ from missions.trajectory import Trajectory
 
 INDOOR = load_mission("indoor")
 GCS = events.Sender(255, 190)
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+"""The attitude of a vehicle that stands still and looks north."""
 START_M = np.array([1.0, 6.5, 1.5])
 HOME = INDOOR.frame.geodetic(np.array([1.0, 6.5, 0.0]))
 TRACK_M = np.array([[4.0, 5.0, 1.5], [7.0, 4.2, 1.5], [12.0, 5.5, 1.5], [19.0, 8.5, 1.5]])
@@ -111,7 +113,7 @@ class Rig:
         return out
 
     def odometry(self) -> events.Odometry:
-        return events.Odometry(self.now_s, self.place_ned_m, self.velocity_ned_m_s, 0.0)
+        return events.Odometry(self.now_s, self.place_ned_m, self.velocity_ned_m_s, LEVEL)
 
     def answer(self, request: PlanRequest) -> events.PlanReady:
         return events.PlanReady(self.planner.plan(request), 2.0)

@@ -23,7 +23,7 @@ from missions.frames import AutopilotFrame
 from missions.mission_items import MissionItem
 from missions.tunnel import CompanionStatus, PayloadType, Reason, decode_status
 from tests.simulation import virtual_time
-from tests.unit.companion.rig import GCS, HOME, INDOOR, START_M, StraightPlanner, items_of
+from tests.unit.companion.rig import GCS, HOME, INDOOR, LEVEL, START_M, StraightPlanner, items_of
 
 T = TypeVar("T")
 ODOMETRY_INTERVAL_S = 0.03
@@ -59,7 +59,7 @@ class BenchVehicle:
         if self._queue.empty():
             await asyncio.sleep(ODOMETRY_INTERVAL_S)
             now_s = asyncio.get_running_loop().time()
-            return events.Odometry(100.0 + now_s, self._place_ned_m, np.zeros(3), 0.0)
+            return events.Odometry(100.0 + now_s, self._place_ned_m, np.zeros(3), LEVEL)
         return self._queue.get_nowait()
 
     def say(self, event: events.Event) -> None:

@@ -12,7 +12,7 @@ from companion.states import TRANSITIONS
 from missions.mission import OnArrival
 from missions.mission_items import Command, MissionItem, plan_id
 from missions.tunnel import CompanionState, Reason, TrajectoryKind
-from tests.unit.companion.rig import GCS, HOME, INDOOR, START_M, TRACK_M, Rig, items_of, moved, of, with_home
+from tests.unit.companion.rig import GCS, HOME, INDOOR, LEVEL, START_M, TRACK_M, Rig, items_of, moved, of, with_home
 
 State = CompanionState
 ACTING = (instructions.SendSetpoint, instructions.CommandMode)
@@ -382,7 +382,7 @@ def test_a_lost_autopilot_ends_the_stream_and_it_does_not_fly_on_by_itself():
 def test_an_autopilot_whose_time_jumps_back_was_rebooted():
     rig = Rig().flying()
     rig.run(1.0)
-    rebooted = events.Odometry(3.0, rig.place_ned_m, np.zeros(3), 0.0)
+    rebooted = events.Odometry(3.0, rig.place_ned_m, np.zeros(3), LEVEL)
     assert of(rig.feed(rebooted), instructions.EndSetpoints)
     assert rig.pilot.state is State.WAITING
 

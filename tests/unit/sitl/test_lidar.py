@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from missions import obstacles
-from missions.lidar_packets import unpack
+from missions.lidar_packets import MOUNT_FLU_M, unpack
 from missions.mission import RangeSensor
 from missions.world import Box, Cylinder, Mover, Peak, Threat, World
 from sitl.dialect import mavlink
 from sitl.microservices.outbox import Link
 from sitl.open_field import open_field
-from sitl.sensors.lidar import MOUNT_FLU_M, RangeSensors, flu_to_enu, ray_grid
+from sitl.sensors.lidar import RangeSensors, flu_to_enu, ray_grid
 from sitl.sensors.ray_casting import cast_rays
 from sitl.simulator import Simulator
 from tests.unit.sitl.flown import Flown

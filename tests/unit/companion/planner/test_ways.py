@@ -179,7 +179,7 @@ def test_who_starts_too_fast_brakes_as_hard_as_it_can():
 
 
 def reference_of(start: np.ndarray, points_m: np.ndarray = AROUND_THE_CRATE_M, to_m: float = 7.5):
-    return lay_reference(way_of(points_m), 0.0, to_m, start, 61, LIMITS, AROUND.obstacles)
+    return lay_reference(way_of(points_m), 0.0, to_m, start, 61, LIMITS, AROUND)
 
 
 def test_a_reference_begins_at_the_vehicle_and_ends_on_the_way():
@@ -212,7 +212,7 @@ def test_a_way_that_lacks_a_little_distance_is_passed_farther_off_at_speed():
 
 def test_leg_speeds_cap_a_reference_and_tangents_are_unit_vectors():
     start = np.array([START_M, np.zeros(3), np.zeros(3)])
-    slow = lay_reference(way_of(AROUND_THE_CRATE_M, 1.2), 0.0, 6.0, start, 61, LIMITS, AROUND.obstacles)
+    slow = lay_reference(way_of(AROUND_THE_CRATE_M, 1.2), 0.0, 6.0, start, 61, LIMITS, AROUND)
     speeds = np.linalg.norm(np.diff(slow.samples[:, :3], axis=0), axis=1) / (slow.duration_s / 60)
     assert speeds.max() <= 1.2 + 1e-6
     assert slow.samples[:, SPEED_CAP].max() == pytest.approx(1.2 / LIMITS.nominal_ratio)
@@ -224,7 +224,7 @@ def test_a_reference_at_the_target_reads_nothing_behind_the_ways_only_sample():
     samples = np.vstack((np.array([*START_M, 3.0, 0.2]), np.full(5, np.nan)))
     at_target = Way(samples[:1], np.array([0.0, np.nan])[:1])
     start = np.array([START_M, np.zeros(3), np.zeros(3)])
-    reference = lay_reference(at_target, 0.0, 0.0, start, 61, LIMITS, AROUND.obstacles)
+    reference = lay_reference(at_target, 0.0, 0.0, start, 61, LIMITS, AROUND)
     np.testing.assert_allclose(reference.samples[:, :3], np.tile(START_M, (61, 1)), atol=1e-9)
 
 

@@ -1,0 +1,93 @@
+"""How far it is to what was seen: a field of distances on nodes two voxels apart, kept up to date voxel by voxel.
+
+A voxel that becomes occupied lowers the field around itself by a template, which is a few hundred bytes compared in
+rows. One that becomes free only makes the blocks around it stale: they are written anew some at a time, so that the
+field errs to the safe side meanwhile, and no scan takes long.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from missions.kernels import compiled
+from missions.obstacles import FAR_M
+
+Array = npt.NDArray[np.float64]
+Bytes = npt.NDArray[np.uint8]
+
+VOXELS_PER_NODE = 2
+SATURATED = 255
+"""A node's value from which on nothing is near."""
+
+
+class Field(NamedTuple):
+    """Distances to the nearest occupied voxel's centre, in steps, up to `SATURATED` steps."""
+
+    values: Bytes
+    """(a, b, c) nodes; (0, 0, 0) where nothing senses."""
+    low_m: Array
+    """(3,) the first node, mission ENU."""
+    spacing_m: float
+    """Between nodes."""
+    step_m: float
+    """One unit of the values."""
+
+
+def no_field() -> Field:
+    """The field of a vehicle that sees nothing."""
+    return Field(np.zeros((0, 0, 0), np.uint8), np.zeros(3), 1.0, 1.0)
+
+
+def templates(reach_nodes: int) -> Bytes:
+    """(8, s, s, s) values around an occupied voxel, for the eight ways in which it may lie between the nodes.
+
+    Row `o` of an axis belongs to the node `o - reach_nodes` after the voxel's own; s = 2 reach_nodes + 2. The value
+    `SATURATED` stands for a distance of `reach_nodes` + 1/4 spacings.
+    """
+    offsets = np.arange(-reach_nodes, reach_nodes + 2)
+    out = []
+    for way in range(8):
+        parts = [(offsets - (0.75 if way >> axis & 1 else 0.25)) ** 2 for axis in range(3)]
+        distance = np.sqrt(parts[0][:, None, None] + parts[1][None, :, None] + parts[2][None, None, :])
+        out.append(np.minimum(np.floor(distance * SATURATED / (reach_nodes + 0.25)), SATURATED))
+    return np.array(out).astype(np.uint8)
+
+
+@compiled
+def distance_at(east: float, north: float, up: float, field: Field) -> float:
+    """Distance [m] at a place, between the nodes linearly; `FAR_M` beyond the field's reach and outside of it."""
+    values, low_m, spacing_m = field.values, field.low_m, field.spacing_m
+    x, y, z = (east - low_m[0]) / spacing_m, (north - low_m[1]) / spacing_m, (up - low_m[2]) / spacing_m
+    if not (x >= 0.0 and y >= 0.0 and z >= 0.0):
+        return FAR_M
+    i, j, k = np.uint64(x), np.uint64(y), np.uint64(z)
+    one = np.uint64(1)
+    if i + one >= values.shape[0] or j + one >= values.shape[1] or k + one >= values.shape[2]:
+        return FAR_M
+    a, b = np.int64(values[i, j, k]), np.int64(values[i, j, k + one])
+    c, d = np.int64(values[i, j + one, k]), np.int64(values[i, j + one, k + one])
+    e, f = np.int64(values[i + one, j, k]), np.int64(values[i + one, j, k + one])
+    g, h = np.int64(values[i + one, j + one, k]), np.int64(values[i + one, j + one, k + one])
+    if a + b + c + d + e + f + g + h == 8 * SATURATED:
+        return FAR_M
+    p, q, r = x - i, y - j, z - k
+    near = (a + (b - a) * r) * (1.0 - q) + (c + (d - c) * r) * q
+    far = (e + (f - e) * r) * (1.0 - q) + (g + (h - g) * r) * q
+    return (near + (far - near) * p) * field.step_m
+
+
+@compiled
+def lower(values: Bytes, template: Bytes, a: int, b: int, c: int) -> None:
+    """Lower the values (a, b, c) of a field by the template (s, s, s) of an occupied voxel behind the node a, b, c."""
+    size, shape = len(template), values.shape
+    reach = size // 2 - 1
+    field, mask = values.reshape(-1), template.reshape(-1)
+    first, last = max(reach - c, 0), min(size, shape[2] - c + reach)
+    for i in range(max(reach - a, 0), min(size, shape[0] - a + reach)):
+        for j in range(max(reach - b, 0), min(size, shape[1] - b + reach)):
+            at = np.uint64(((a - reach + i) * shape[1] + b - reach + j) * shape[2] + c - reach + first)
+            of = np.uint64((i * size + j) * size + first)
+            for k in range(np.uint64(last - first)):
+                if mask[of + k] < field[at + k]:
+                    field[at + k] = mask[of + k]
