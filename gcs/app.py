@@ -19,8 +19,8 @@ from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
+from gcs.link.opening import open_link
 from gcs.link.tlog import TlogWriter
-from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
 from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere
@@ -64,7 +64,10 @@ class FlightApp:
     ) -> None:
         self.settings, self.work_dir, self._page = settings, work_dir, page
         self._keys = key_ring(settings, mission, work_dir, events)
-        station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+        station = Station(
+            recording=TlogWriter(work_dir / "flight.tlog"),
+            say=lambda text: events.add("link", text, severity=Severity.WARNING),
+        )
         station.codec.signing = self._keys.signing(station.unix_us)
         flight = FleetFlight(
             station=station,
@@ -105,7 +108,7 @@ class FlightApp:
             assert self.station.recording is not None
             stack.callback(self.station.recording.close)
             for url in self.settings.ground_links():
-                connection = await open_udp(url, self.station.receive)
+                connection = await open_link(url, self.station.receive, self.station.say)
                 stack.callback(connection.close)
                 self.station.connections.append(connection)
             simulator = await stack.enter_async_context(Processes(self.work_dir))

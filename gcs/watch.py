@@ -5,10 +5,10 @@ from contextlib import AsyncExitStack
 
 from gcs.app import TRAIL_INTERVAL_S, Page
 from gcs.desk import Desk
-from gcs.flight.events import EventLog
+from gcs.flight.events import EventLog, Severity
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.trails import Trails
-from gcs.link.udp import open_udp
+from gcs.link.opening import open_link
 from gcs.security.key_ring import KeyRing
 from gcs.settings import FlightSettings
 from gcs.station import Station
@@ -21,12 +21,12 @@ async def watch(settings: FlightSettings, events: EventLog, page: Page) -> None:
     Raises:
         UsageError: a port in use, or a key ring that cannot be used.
     """
-    station = Station()
+    station = Station(say=lambda text: events.add("link", text, severity=Severity.WARNING))
     station.codec.signing = KeyRing(settings.key_folder()).signing(station.unix_us)
     desk = Desk(station, events)
     async with AsyncExitStack() as stack:
         for url in settings.ground_links():
-            connection = await open_udp(url, station.receive)
+            connection = await open_link(url, station.receive, station.say)
             stack.callback(connection.close)
             station.connections.append(connection)
             events.add("link", f"listening on {url}")

@@ -9,6 +9,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from gcs.link.codec import SourceCount
+
 PathKey = TypeVar("PathKey")
 
 STALE_S = 1.5
@@ -24,26 +26,6 @@ MOST_PATHS = 8
 MOST_PINGS = 8
 WINDOW_S = 5.0
 NANO = 1e-9
-
-
-@dataclass
-class SourceCount:
-    """What was heard from one component, and what its sequence numbers say was lost on the way."""
-
-    received: int = 0
-    lost: int = 0
-    _next_seq: int | None = None
-
-    def count(self, seq: int) -> None:
-        if self._next_seq is not None:
-            gap = (seq - self._next_seq) % 256
-            if gap >= 128:  # an older packet, that was overtaken
-                self.lost = max(0, self.lost - 1)
-                self.received += 1
-                return
-            self.lost += gap
-        self.received += 1
-        self._next_seq = (seq + 1) % 256
 
 
 @dataclass(frozen=True)

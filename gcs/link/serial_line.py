@@ -31,7 +31,7 @@ class SerialLine:
         if self._port is None:
             return
         try:
-            written = os.write(self._port.fd, datagram)
+            written = os.write(self._port.fileno(), datagram)
         except BlockingIOError:
             written = 0
         except OSError:
@@ -59,7 +59,7 @@ class SerialLine:
             pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
     async def _listen(self, port: serial.Serial) -> None:
-        loop, number = asyncio.get_running_loop(), port.fd
+        loop, number = asyncio.get_running_loop(), port.fileno()
         os.set_blocking(number, False)
         self._lost.clear()
         self._splitter = FrameSplitter()

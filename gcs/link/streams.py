@@ -77,7 +77,7 @@ class TcpClient:
 class TcpServer:
     """A listening socket; each client is one address."""
 
-    peer = None
+    peer: Address | None = None
 
     def __init__(self, url: LinkUrl, receiver: Receiver, say: Notice) -> None:
         self.url, self.budget_bytes_s = url, url.budget_bytes_s

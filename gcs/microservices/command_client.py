@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from gcs.dialect import Message, enum_name, mavlink
 from gcs.errors import CommandRefused, LinkLost
-from gcs.microservices import Backoff
+from gcs.microservices import Backoff, Microservice
 from missions.frames import GeodeticPoint
 from missions.mission_items import DEG_E7
 
@@ -18,6 +18,13 @@ PROGRESS_TIMEOUT_S = 30.0
 """Patience once the other side has said that it is at work."""
 
 NAN = math.nan
+
+ONE_BY_ONE = frozenset({mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE})
+"""Their acknowledgements do not say which message was meant."""
+MAKING_SAFE = frozenset({mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH})
+"""Sent also where a second vehicle with the same system id is heard: to the one that was there first."""
+MOVING = MAKING_SAFE | {mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_DO_REPOSITION}
+"""Of these the last one that was given counts."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ class PlaceCommand(Command):
 
 
 @dataclass
-class CommandClient:
+class CommandClient(Microservice):
     """One command to one component.
 
     Raises:
@@ -70,6 +77,11 @@ class CommandClient:
     wants: frozenset[str] = frozenset({"COMMAND_ACK"})
     _confirmation: int = 0
     _backoff: Backoff = field(default_factory=lambda: Backoff(FIRST_TIMEOUT_S, ATTEMPTS))
+
+    def __post_init__(self) -> None:
+        number = self.command.number
+        self.turn = f"command {number}" if number in ONE_BY_ONE else None
+        self.makes_safe = number in MAKING_SAFE
 
     def start(self, now_s: float) -> list[Message]:
         self.deadline_s = now_s + self._backoff.take()
@@ -96,11 +108,14 @@ class CommandClient:
         self._confirmation = min(self._confirmation + 1, 255)
         return self.start(now_s)
 
-    def abandon(self) -> list[Message]:
-        """A command that the other side is at work on is cancelled; any other has been obeyed, or was not heard."""
-        if not self.in_progress or self.done:
-            return []
-        return [mavlink.MAVLink_command_cancel_message(*self.peer, self.command.number)]
+    def replaced_by(self, newer: Microservice) -> Exception | None:
+        """A newer order of the same kind must not be undone by a late repetition of the older one."""
+        if not isinstance(newer, CommandClient) or self.turn is not None or newer.peer != self.peer:
+            return None
+        same_kind = newer.command.number == self.command.number or {newer.command.number, self.command.number} <= MOVING
+        if not same_kind or newer.command == self.command:
+            return None
+        return CommandRefused(f"{self}: replaced by a newer order, {newer.command.name}")
 
     def __str__(self) -> str:
         return f"vehicle {self.peer[0]}: {self.command.name}"

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 
 from gcs.dialect import Message, mavlink
 from gcs.errors import LinkLost
-from gcs.microservices import Backoff
+from gcs.microservices import Backoff, Microservice
 
 FIRST_TIMEOUT_S = 0.4
 ATTEMPTS = 12
 
 
 @dataclass
-class CurrentItem:
+class CurrentItem(Microservice):
     """Set the current item and see it set.
 
     Args:
@@ -52,6 +52,3 @@ class CurrentItem:
             self.done = True
             raise LinkLost(f"vehicle {self.peer[0]}: does not say that item {self.seq} is its current one")
         return self.start(now_s)
-
-    def abandon(self) -> list[Message]:
-        return []

@@ -21,8 +21,8 @@ _FIRST_DO_COMMAND = 95
 def first_difference(sent: Sequence[MissionItem], stored: Sequence[MissionItem], mission_type: int = 0) -> str:
     """What differs between two lists of items, as a phrase; empty where they fly the same.
 
-    A NaN of ours may come back as 0 (PX4 keeps no NaN yaw on some items), a yaw may come back turned by 360 degrees, and
-    a fence has neither altitudes nor a frame of its own.
+    A NaN of ours may come back as 0 (PX4 keeps no NaN yaw on some items), a yaw may come back turned by 360 degrees,
+    and a fence has neither altitudes nor a frame of its own.
     """
     if len(sent) != len(stored):
         return f"{len(stored)} items instead of {len(sent)}"

@@ -1,8 +1,8 @@
 """Downloading a plan with requests ahead of the vehicle's answers.
 
 A PX4 gives out items strictly in order: it answers a request for the item that is next, or for the one before it once
-more, and drops the whole download at any other. So requests run ahead in order, each in as many copies as keep the risk
-low that all of one's copies are lost; what is missing after a pass is asked for in a second one. See docs/ground-link.md.
+more, and drops the whole download at any other. So requests run ahead in order, each in as many copies as keep the
+risk low that all of one's copies are lost; what is missing after a pass is asked for in a second one.
 """
 
 import math
@@ -10,11 +10,13 @@ from dataclasses import dataclass, field
 
 from gcs.dialect import Message, enum_name, mavlink
 from gcs.errors import MissionTransferError
+from gcs.microservices import Microservice
 from gcs.microservices.mission_messages import (
     FORGOTTEN_AFTER_S,
     KIND_NAMES,
     MAX_ITEMS,
     MISSION,
+    MISSION_TURN,
     PASSING_RESULTS,
     LinkEstimate,
     item_content,
@@ -41,7 +43,7 @@ TRIES_OF_LAST, TRIES_ALONE = 3, 10
 
 
 @dataclass
-class MissionDownload:
+class MissionDownload(Microservice):
     """Ask for all items; they end up in `items`.
 
     Args:
@@ -62,6 +64,7 @@ class MissionDownload:
     done: bool = False
     deadline_s: float = math.inf
     wants: frozenset[str] = frozenset({"MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK"})
+    turn: str | None = MISSION_TURN
     requests_sent: int = 0
     items_received: int = 0
     """Item messages, copies included."""
@@ -206,7 +209,9 @@ class MissionDownload:
         tries = TRIES_OF_LAST if self._keeps_order else TRIES_ALONE
         if last >= 0 and not answered and walk.tries < tries and self._is_worth_asking_again(last, end):
             walk.tries += 1
-            messages = self._request(walk, last, min(2 * self._copies(last), MOST_COPIES) if self._keeps_order else 1, now_s)
+            messages = self._request(
+                walk, last, min(2 * self._copies(last), MOST_COPIES) if self._keeps_order else 1, now_s
+            )
             self.deadline_s = now_s + self._round_trip.timeout_s
             return messages
         if not answered:

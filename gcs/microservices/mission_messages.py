@@ -11,6 +11,8 @@ FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 KIND_NAMES = {MISSION: "mission", FENCE: "fence", RALLY: "rally points"}
 
+MISSION_TURN = "mission"
+"""A vehicle takes part in one transfer at a time."""
 MOST_IN_FLIGHT = 16
 """Frames under way at once, copies included: 0.8 kB of items."""
 FORGOTTEN_AFTER_S = 5.0
@@ -66,5 +68,3 @@ def item_content(message: Message) -> MissionItem:
         y=message.y,
         z=message.z,
     )
-
-

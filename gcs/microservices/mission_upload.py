@@ -11,10 +11,12 @@ from dataclasses import dataclass, field
 
 from gcs.dialect import Message, enum_name, mavlink
 from gcs.errors import MissionTransferError
+from gcs.microservices import Microservice
 from gcs.microservices.mission_messages import (
     FORGOTTEN_AFTER_S,
     KIND_NAMES,
     MISSION,
+    MISSION_TURN,
     MOST_IN_FLIGHT,
     PASSING_RESULTS,
     LinkEstimate,
@@ -41,7 +43,7 @@ ERRORS_THAT_COUNT = 2
 
 
 @dataclass
-class MissionUpload:
+class MissionUpload(Microservice):
     """Offer items until the vehicle has taken them all.
 
     At the end `acknowledged` tells whether the vehicle has said so; if not, all items were sent and only reading back
@@ -65,6 +67,7 @@ class MissionUpload:
     acknowledged: bool = False
     deadline_s: float = math.inf
     wants: frozenset[str] = frozenset({"MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK"})
+    turn: str | None = MISSION_TURN
     items_sent: int = 0
     """Item messages, copies included."""
 
@@ -207,7 +210,7 @@ class MissionUpload:
         self._errors += 1
         if self._base is None:
             return self._busy(now_s)
-        elif self.all_sent and self._next == len(self.items):
+        if self.all_sent and self._next == len(self.items):
             self.done = self._errors >= ERRORS_THAT_COUNT  # it is idle: stored, or forgotten
         elif self._errors >= ERRORS_THAT_COUNT * self._window * self._copies:
             return self._begin(now_s)  # it is idle, and has not got everything

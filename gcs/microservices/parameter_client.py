@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from gcs.dialect import Message, mavlink
 from gcs.errors import ParameterError
-from gcs.microservices import Backoff
+from gcs.microservices import Backoff, Microservice
 
 FIRST_TIMEOUT_S = 0.5
 ATTEMPTS = 8
@@ -19,7 +19,7 @@ Value = int | float
 
 
 @dataclass
-class ParameterExchange:
+class ParameterExchange(Microservice):
     """Read a parameter, or, given a value, set it and wait for the echo that shows the value stored.
 
     PX4 answers a wrong name, type or index with silence, so a set is preceded by a read, which tells the type.
@@ -60,9 +60,6 @@ class ParameterExchange:
             self.done = True
             raise ParameterError(f"vehicle {self.peer[0]}: parameter {self.name}: {self._complaint()}")
         return self.start(now_s)
-
-    def abandon(self) -> list[Message]:
-        return []
 
     def _complaint(self) -> str:
         if self.value is None:

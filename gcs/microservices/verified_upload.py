@@ -1,7 +1,7 @@
 """Putting a plan onto a vehicle with certainty about what is stored: upload, read back, compare, and again if need be.
 
-An upload's own end is uncertain on a lossy link: the final acknowledgement may be lost or forged. What the vehicle gives
-out when it is asked decides. Until the last item is taken it keeps its old plan, so there is never half of one.
+An upload's own end is uncertain on a lossy link: the final acknowledgement may be lost or forged. What the vehicle
+gives out when it is asked decides. Until the last item is taken it keeps its old plan, so there is never half of one.
 """
 
 import math
@@ -11,9 +11,10 @@ from enum import Enum
 
 from gcs.dialect import Message
 from gcs.errors import MissionTransferError
+from gcs.microservices import Microservice
 from gcs.microservices.mission_comparison import first_difference
 from gcs.microservices.mission_download import MissionDownload
-from gcs.microservices.mission_messages import KIND_NAMES, MISSION, LinkEstimate
+from gcs.microservices.mission_messages import KIND_NAMES, MISSION, MISSION_TURN, LinkEstimate
 from gcs.microservices.mission_upload import MissionUpload
 from missions.mission_items import MissionItem
 
@@ -32,7 +33,7 @@ class Stage(Enum):
 
 
 @dataclass
-class VerifiedUpload:
+class VerifiedUpload(Microservice):
     """Upload, and end well only when exactly these items are stored.
 
     Args:
@@ -54,6 +55,7 @@ class VerifiedUpload:
     wants: frozenset[str] = frozenset(
         {"MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT"}
     )
+    turn: str | None = MISSION_TURN
     stage: Stage = Stage.UPLOADING
     uploads: int = 0
     items_sent: int = 0

@@ -39,6 +39,7 @@ class OnboardWire:
     """The onboard link of one vehicle, in memory."""
 
     peer = None
+    budget_bytes_s = None
 
     def __init__(self, simulator: Simulator, sysid: int) -> None:
         self._simulator, self._sysid = simulator, sysid

@@ -1,4 +1,4 @@
-"""A ground station's microservice against the simulator's mission server over a link with delay and loss, in virtual time.
+"""A ground station's microservice against the simulator's mission server over a simulated link, in virtual time.
 
 Client and server were written apart; between them go packed frames, each way late by the link's delay, and some lost.
 """

@@ -87,11 +87,9 @@ def test_a_lost_item_and_all_behind_it_go_out_again_when_its_answer_is_late():
 
 def test_the_window_shrinks_with_the_loss():
     upload, _ = begun_upload()
-    now_s, base = 0.1, 0
-    for _ in range(12):
+    for base in range(1, 13):
         now_s = upload.deadline_s
         upload.handle_timeout(now_s)
-        base += 1
         upload.receive(request(base), now_s + 0.1)
     assert len(upload.handle_timeout(upload.deadline_s)) <= MOST_IN_FLIGHT
     assert upload.learned.loss > 0.2

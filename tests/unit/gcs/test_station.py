@@ -16,6 +16,7 @@ class Wire:
     """A connection that keeps what is sent."""
 
     peer = None
+    budget_bytes_s = None
 
     def __init__(self) -> None:
         self.sent: list[bytes] = []
