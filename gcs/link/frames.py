@@ -7,7 +7,7 @@ from gcs.dialect import mavlink
 MAGICS = {0xFD: 12, 0xFE: 8}
 """First byte -> bytes besides the payload, without a signature."""
 SIGNED, SIGNATURE_BYTES = 0x01, 13
-MOST_PENDING_BYTES = 4096
+LONGEST_FRAME_BYTES = 280
 
 
 class FrameSplitter:

@@ -21,7 +21,7 @@ LONGEST_ACCEPTED_S = {
     (1000, 0.1): 30.0,
     (1000, 0.3): 92.0,
 }
-"""(items, loss) -> what a window of 16 takes at 50 ms each way to the acknowledgement; `TOLERANCE` times it is allowed."""
+"""(items, loss) -> what a window of 16 takes to the acknowledgement; `TOLERANCE` times it is allowed."""
 MOST_ITEM_MESSAGES = 3.0
 """Per item, up to 10 % loss."""
 
