@@ -43,7 +43,7 @@ MissionArgument = Annotated[str, typer.Argument(metavar="MISSION", help="a missi
 LinkOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--link", metavar="URL", help="udpin, udpout, tcp, tcpin://HOST:PORT, serial:///dev/X:BAUD; repeatable"
+        "--link", metavar="URL", help="udpin, udpout, tcp, tcpin://HOST:PORT, serial://DEVICE:BAUD; repeatable"
     ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="of planner and simulator: one seed, one plan")]
