@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from gcs.dialect import Message, mavlink
+from gcs.dialect import AUTOPILOT, Message, mavlink
 from gcs.errors import AmbiguousVehicle, LinkLost
 from gcs.exchange import Exchange
 from gcs.fleet.fleet import Fleet
@@ -28,6 +28,13 @@ BULK = frozenset({"MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_SET", "PARAM
 """What gives way to everything else where a link's budget is short."""
 
 S = TypeVar("S", bound=Microservice)
+
+
+def _who_are_you(sysid: int) -> Message:
+    """A request for AUTOPILOT_VERSION, which has the hardware's id."""
+    params = (float(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION), *(0.0,) * 6)
+    request = mavlink.MAV_CMD_REQUEST_MESSAGE
+    return mavlink.MAVLink_command_long_message(sysid, AUTOPILOT, request, 0, *params)
 
 
 @dataclass
@@ -183,9 +190,12 @@ class Station:
         return all(target in {0, our} for target, our in zip(targets, ours, strict=True))
 
     def _measure_round_trips(self, sysid: int) -> None:
-        for way, path in self.routes.live_paths(sysid, self.now_s):
-            question = mavlink.MAVLink_timesync_message(0, path.ping(self.now_s))
-            self._transmit(question, way, sysid)
+        """On every path; where there are several, it is also asked whose they are."""
+        live = self.routes.live_paths(sysid, self.now_s)
+        for way, path in live:
+            self._transmit(mavlink.MAVLink_timesync_message(0, path.ping(self.now_s)), way, sysid)
+            if len(live) > 1 and path.hardware_id is None:
+                self._transmit(_who_are_you(sysid), way, sysid)
 
     def _send_all(self, messages: Iterable[Message], sysid: int) -> None:
         for message in messages:

@@ -153,6 +153,24 @@ def test_an_ambiguous_vehicle_gets_no_orders_but_those_that_make_safe():
     virtual_time.run(play())
 
 
+def test_who_is_heard_over_several_paths_is_asked_for_its_hardware_id():
+    async def play() -> None:
+        rig = Rig()
+        for address in (RADIO, WIFI):
+            rig.hear(address, HEARTBEAT)
+        beating = asyncio.create_task(rig.station.send_heartbeats())
+        await asyncio.sleep(0.01)
+        for address, uid in ((RADIO, 11), (WIFI, 22)):
+            asked = [m for f in rig.wires[address].sent for m in Codec().parse(f) if m.get_type() == "COMMAND_LONG"]
+            assert [(m.command, m.param1) for m in asked] == [(mavlink.MAV_CMD_REQUEST_MESSAGE, 148.0)]
+            version = mavlink.MAVLink_autopilot_version_message(0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, uid)
+            rig.hear(address, version)
+        assert len(rig.station.routes.rivals(1, rig.station.now_s)) == 1
+        beating.cancel()
+
+    virtual_time.run(play())
+
+
 def test_another_ground_station_is_said_once():
     async def play() -> None:
         rig = Rig()
