@@ -82,7 +82,7 @@ def _fleet(missed: list[str]) -> Iterator[str]:
     yield "|---|---|---|"
     yield f"| messages received per second | {figures.messages_hz:.0f} | – |"
     yield f"| link and fleet state, cores | {figures.cpu_share:.2f} | {fleet.MOST_CPU:g} |"
-    yield f"| age of positions beyond the link's delay, p99, s | {figures.age_p99_s:.3f} | {fleet.OLDEST_P99_S:g} |"
+    yield f"| age of the newest positions at any moment, p99, s | {figures.age_p99_s:.3f} | {fleet.OLDEST_P99_S:g} |"
     stored = f"{figures.stored}/{figures.vehicles}"
     what = f"{fleet.N_ITEMS} items to each, verified ({stored}), s"
     yield f"| {what} | {figures.upload_s:.1f} | {fleet.LONGEST_UPLOAD_S:g} |"
