@@ -1,6 +1,7 @@
 """One microservice at work: fed with messages as they arrive and with its deadlines, until it is done or fails."""
 
 import asyncio
+import contextvars
 import math
 from collections.abc import Callable
 
@@ -23,6 +24,8 @@ class Exchange:
         self._loop = asyncio.get_running_loop()
         self._ended: asyncio.Future[None] = self._loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
+        self._context = contextvars.copy_context()
+        """Whose order this is, for the audit log: answers arrive and timers fire in nobody's context."""
 
     async def run(self) -> None:
         """Until the service is done; its errors pass through. Cancelled, it tells the peer."""
@@ -39,7 +42,7 @@ class Exchange:
     def deliver(self, message: Message) -> None:
         """Hand over a message of the peer, if the service reads such."""
         if message.get_type() in self.service.wants and not self._ended.done():
-            self._step(lambda now_s: self.service.receive(message, now_s))
+            self._context.copy().run(self._step, lambda now_s: self.service.receive(message, now_s))
 
     def give_way_to(self, newer: Microservice) -> None:
         """End if a newer order to the same component makes this one void."""
@@ -79,4 +82,4 @@ class Exchange:
         if self.service.deadline_s > self._loop.time():
             self._arm()
         else:
-            self._step(self.service.handle_timeout)
+            self._context.copy().run(self._step, self.service.handle_timeout)

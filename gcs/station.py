@@ -22,6 +22,7 @@ from gcs.link.shaper import Shaper, Urgency
 from gcs.link.tlog import TlogWriter
 from gcs.microservices import Microservice
 from gcs.microservices.mission_messages import LinkEstimate
+from gcs.security.audit import Audit
 
 HEARTBEAT_INTERVAL_S = 1.0
 BULK = frozenset({"MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_SET", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST"})
@@ -43,11 +44,13 @@ class Station:
 
     Args:
         recording: where all frames, received and sent, are written.
+        audit: where all orders and their results are written.
         unix_us: the wall clock for the recording's stamps.
         say: takes a sentence for the operator about links and who is on them.
     """
 
     recording: TlogWriter | None = None
+    audit: Audit | None = None
     unix_us: Callable[[], int] = lambda: time.time_ns() // 1000
     fleet: Fleet = field(default_factory=Fleet)
     codec: Codec = field(default_factory=Codec)
@@ -73,10 +76,12 @@ class Station:
             if self.recording is not None:
                 self.recording.write(message.get_msgbuf(), self.unix_us())
             self.fleet.fold(message, now_s)
-            exchanges = self._exchanges.get((message.get_srcSystem(), message.get_srcComponent()))
-            if exchanges and self._is_for_us(message):
-                for exchange in tuple(exchanges):
-                    exchange.deliver(message)
+            if not self._is_for_us(message):
+                continue
+            if self.audit is not None:
+                self.audit.received(message)
+            for exchange in tuple(self._exchanges.get((message.get_srcSystem(), message.get_srcComponent()), ())):
+                exchange.deliver(message)
 
     def send(self, message: Message, sysid: int) -> None:
         """Send to where `sysid` is heard best; a system that was never heard gets nothing."""
@@ -203,6 +208,8 @@ class Station:
 
     def _transmit(self, message: Message, way: tuple[Connection, Address], sysid: int) -> None:
         connection, address = way
+        if self.audit is not None:
+            self.audit.sent(message, sysid)
         frame = self.codec.pack(message, sysid, lane=way)
         if self.recording is not None:
             self.recording.write(frame, self.unix_us())

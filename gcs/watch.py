@@ -2,6 +2,7 @@
 
 import asyncio
 from contextlib import AsyncExitStack
+from pathlib import Path
 
 from gcs.app import TRAIL_INTERVAL_S, Page
 from gcs.desk import Desk
@@ -9,22 +10,32 @@ from gcs.flight.events import EventLog, Severity
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.trails import Trails
 from gcs.link.opening import open_link
+from gcs.link.tlog import TlogWriter
+from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
 from gcs.settings import FlightSettings
 from gcs.station import Station
 from missions.frames import LocalFrame
 
 
-async def watch(settings: FlightSettings, events: EventLog, page: Page) -> None:
-    """Serve the page until cancelled.
+async def watch(settings: FlightSettings, events: EventLog, work_dir: Path, page: Page) -> None:
+    """Serve the page until cancelled; everything is recorded in `work_dir`.
 
     Raises:
         UsageError: a port in use, or a key ring that cannot be used.
     """
-    station = Station(say=lambda text: events.add("link", text, severity=Severity.WARNING))
+    audit = AuditFile(work_dir / AUDIT_FILE)
+    station = Station(
+        recording=TlogWriter(work_dir / "flight.tlog"),
+        say=lambda text: events.add("link", text, severity=Severity.WARNING),
+    )
+    station.audit = Audit(audit.write, station.unix_us)
     station.codec.signing = KeyRing(settings.key_folder()).signing(station.unix_us)
     desk = Desk(station, events)
     async with AsyncExitStack() as stack:
+        assert station.recording is not None
+        stack.callback(station.recording.close)
+        stack.callback(audit.close)
         for url in settings.ground_links():
             connection = await open_link(url, station.receive, station.say)
             stack.callback(connection.close)
