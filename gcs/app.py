@@ -23,9 +23,9 @@ from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
+from gcs.link.opening import open_link
 from gcs.link.simulator_control import ControlPort
 from gcs.link.tlog import TlogWriter
-from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
 from gcs.programs import FlightPrograms
 from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
@@ -80,7 +80,10 @@ class FlightApp:
         self.settings, self.work_dir, self.events = settings, work_dir, events
         self._planner, self._page = planner, page
         self._journal = _journal(work_dir)
-        self.station = Station(recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None))
+        self.station = Station(
+            recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None),
+            say=lambda text: events.add("link", text, severity=Severity.WARNING),
+        )
         self._audit = AuditFile(work_dir / AUDIT_FILE)
         self.station.audit = Audit(self._audit.write, self.station.unix_us)
         self.programs = self._new_programs(mission, settings.mission, work_dir)
@@ -183,7 +186,7 @@ class FlightApp:
             stack.callback(self.station.recording.close)
             stack.callback(self._audit.close)
             for url in self.settings.ground_links():
-                connection = await open_udp(url, self.station.receive)
+                connection = await open_link(url, self.station.receive, self.station.say)
                 stack.callback(connection.close)
                 self.station.connections.append(connection)
             stack.push_async_callback(self._end_programs)
