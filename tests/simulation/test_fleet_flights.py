@@ -52,6 +52,7 @@ def test_two_drones_head_on_pass_each_other_by_what_they_say_alone(fleet_link: d
     assert not system.simulator.collisions
 
 
+@pytest.mark.slow
 def test_a_companion_without_a_radio_flies_on_and_is_kept_clear_of_as_it_was_last_heard():
     system = WholeSystem(INDOOR, seed=1)
     system.simulator.order(LinkFault(link=SimulatedLink.FLEET, vehicle=2, blackout_s=600.0, at_s=6.0))
