@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from companion.errors import CommandRefused
-from companion.events import AutopilotFound, Event, FlightMode, Sender, StartCommanded
+from companion.events import AutopilotFound, Event, FlightMode, RingReported, Sender, StartCommanded
 from companion.instructions import CommandResult
 from companion.link.messages import EVENTS_OF, OdometryMessage
 from companion.setpoints import Setpoint
@@ -24,6 +24,7 @@ from sitl.microservices.outbox import Link
 from sitl.simulator import Simulator
 
 RATES_HZ = {331: 30.0, 436: 10.0, 245: 5.0, 242: 1.0}
+OBSTACLE_DISTANCE = 330
 GPS_GLOBAL_ORIGIN = 49
 HEARTBEAT_INTERVAL_S = 1.0
 YAW_RATE_IGNORED = 0x800
@@ -50,8 +51,9 @@ class OnboardWire:
 class SimulatedAutopilot:
     """See `companion.link.autopilot.Autopilot`."""
 
-    def __init__(self, simulator: Simulator, sysid: int) -> None:
+    def __init__(self, simulator: Simulator, sysid: int, ring_hz: float = 0.0) -> None:
         self._sysid = sysid
+        self._rates_hz = RATES_HZ | ({OBSTACLE_DISTANCE: ring_hz} if ring_hz > 0.0 else {})
         self._peer = (sysid, AUTOPILOT)
         self._wire = OnboardWire(simulator, sysid)
         self._station = Station(codec=Codec(sysid, COMPANION))
@@ -134,7 +136,7 @@ class SimulatedAutopilot:
 
     async def _ask_for_streams(self) -> None:
         await self._found.wait()
-        for message_id, rate_hz in RATES_HZ.items():
+        for message_id, rate_hz in self._rates_hz.items():
             await self._command(actions.set_message_interval(message_id, rate_hz))
         await self._command(Command("request the origin", mavlink.MAV_CMD_REQUEST_MESSAGE, (float(GPS_GLOBAL_ORIGIN),)))
 
@@ -152,7 +154,9 @@ class SimulatedAutopilot:
         if name == "HEARTBEAT" and not self._found.is_set():
             self._found.set()
             self._events.put_nowait(AutopilotFound())
-        if name in EVENTS_OF:
+        if name == "OBSTACLE_DISTANCE" and OBSTACLE_DISTANCE in self._rates_hz:
+            self._events.put_nowait(RingReported(_as_mavsdk_has_it(message)))
+        elif name in EVENTS_OF:
             for event in EVENTS_OF[name](_as_mavsdk_has_it(message)):
                 self._events.put_nowait(event)
         elif name == "ODOMETRY":
