@@ -103,9 +103,10 @@ def ray_grid(sensor: RangeSensor, turn: Array) -> Array:
     columns, rows = (math.ceil(angle / math.radians(sensor.spacing_deg)) for angle in (horizontal, vertical))
     azimuth = horizontal * ((np.arange(columns) + turn[0]) / columns - 0.5)
     elevation = vertical * ((np.arange(rows) + turn[1]) / rows - 0.5)
-    azimuth, elevation = (grid.ravel() for grid in np.meshgrid(azimuth, elevation))
-    level = np.cos(elevation)
-    return np.column_stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+    level, rays = np.cos(elevation), np.empty((rows, columns, 3))
+    rays[..., 0], rays[..., 1] = np.outer(level, np.cos(azimuth)), np.outer(level, np.sin(azimuth))
+    rays[..., 2] = np.sin(elevation)[:, None]
+    return rays.reshape(-1, 3)
 
 
 def seen_sectors(sensor: RangeSensor) -> npt.NDArray[np.bool_]:
@@ -117,11 +118,11 @@ def seen_sectors(sensor: RangeSensor) -> npt.NDArray[np.bool_]:
 
 def flu_to_enu(vectors_flu: Array, attitude_ned_frd: Array) -> Array:
     """(n, 3) vectors of the sensor's frame in ENU, by the quaternion w, x, y, z of the body."""
-    frd = vectors_flu * np.array([1.0, -1.0, -1.0])
-    axis = attitude_ned_frd[1:]
-    twice = 2.0 * np.cross(np.broadcast_to(axis, frd.shape), frd)
-    ned = frd + attitude_ned_frd[0] * twice + np.cross(np.broadcast_to(axis, frd.shape), twice)
-    return swap_enu_ned(ned)
+    w, x, y, z = attitude_ned_frd.tolist()
+    forward = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
+    right = 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
+    down = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+    return vectors_flu @ swap_enu_ned(np.array([forward, right, down]) * np.array([[1.0], [-1.0], [-1.0]]))
 
 
 class PacketStream:

@@ -28,6 +28,12 @@ OBSTACLE_DISTANCE = 330
 GPS_GLOBAL_ORIGIN = 49
 HEARTBEAT_INTERVAL_S = 1.0
 YAW_RATE_IGNORED = 0x800
+ANSWERS = {0, 39, 40, 44, 47, 51, 73, 77}
+"""What microservices wait for: mission transfer and COMMAND_ACK; and HEARTBEAT, which says where to send to."""
+EVENTS = {
+    getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in (*EVENTS_OF, "ODOMETRY", "COMMAND_LONG", "OBSTACLE_DISTANCE")
+}
+"""What becomes events; everything else is not even decoded."""
 MODES = {
     FlightMode.OFFBOARD: Mode.OFFBOARD,
     FlightMode.HOLD: Mode.HOLD,
@@ -66,10 +72,12 @@ class SimulatedAutopilot:
 
     def receive_frame(self, frame: bytes) -> None:
         """A frame that the vehicle has sent on its onboard link."""
+        message_id = int.from_bytes(frame[7:10], "little")
         if not self._tasks:
             return  # not opened yet, or closed
-        self._station.receive(self._wire, frame, ("onboard", self._sysid))
-        for message in self._reader.parse(frame):
+        if message_id in ANSWERS:
+            self._station.receive(self._wire, frame, ("onboard", self._sysid))
+        for message in self._reader.parse(frame) if message_id in EVENTS else []:
             if message.get_srcComponent() == AUTOPILOT:
                 self._read(message)
             elif message.get_type() == "COMMAND_LONG" and message.command == mavlink.MAV_CMD_MISSION_START:
