@@ -10,17 +10,19 @@ from pathlib import Path
 import msgspec
 
 from gcs.desk import Desk
-from gcs.errors import GcsError, ProcessFailed, UsageError
+from gcs.errors import GcsError, KeyRingError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.picture import draw_flight
 from gcs.flight.preflight import origin_here
 from gcs.flight.preparation import CONNECT_TIMEOUT_S
 from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
+from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
 from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
+from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere
 from gcs.station import Station
 from missions import lidar_packets
@@ -61,7 +63,9 @@ class FlightApp:
         page: Page | None = None,
     ) -> None:
         self.settings, self.work_dir, self._page = settings, work_dir, page
+        self._keys = key_ring(settings, mission, work_dir, events)
         station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+        station.codec.signing = self._keys.signing(station.unix_us)
         flight = FleetFlight(
             station=station,
             mission=mission,
@@ -74,6 +78,7 @@ class FlightApp:
         self.flight, self.station, self.events = flight, station, events
         simulated = settings.autopilots is Autopilots.SIMULATED
         self.desk = Desk(station, events, flight, Trails(mission.frame), simulated=simulated)
+        self._security = SecurityWatch(station, events, {vehicle.sysid: vehicle.name for vehicle in mission.vehicles})
         self.report: FlightReport | None = None
         self._first_browser = asyncio.Event()
         self._started_s = time.monotonic()
@@ -167,6 +172,7 @@ class FlightApp:
         settings = self.settings
         self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in half a minute")
         options = ["--seed", str(settings.seed), "--truth", str(self.work_dir / TRUTH_FILE)]
+        options += ["--signing-key", str(self._keys.keys_path)]
         for fault in settings.simulator_faults:
             options += ["--fault", format_fault(fault)]
         options.append("--lidar" if settings.simulates_lidar else "--no-lidar")
@@ -235,6 +241,7 @@ class FlightApp:
             assert self.desk.trails is not None
             self.desk.trails.sample(self.station.fleet, offsets_m)
             self.desk.collect_texts()
+            self._security.look(self.station.now_s)
             await asyncio.sleep(TRAIL_INTERVAL_S / self.settings.speed)
 
     def _write_report(self, reason: str) -> FlightReport:
@@ -255,6 +262,27 @@ class FlightApp:
             return read_truth(truth)
         assert self.desk.trails is not None
         return {sysid: flown_from_trail(trail) for sysid, trail in self.desk.trails.by_sysid.items()}
+
+
+def key_ring(settings: FlightSettings, mission: Mission, work_dir: Path, events: EventLog) -> KeyRing:
+    """The keys of a flight. Simulated vehicles are given theirs: they are made here when they are needed first.
+
+    Raises:
+        KeyRingError: keys of real vehicles cannot be used; simulated ones get keys for this flight alone.
+    """
+    ring = KeyRing(settings.key_folder())
+    if settings.autopilots is not Autopilots.SIMULATED:
+        return ring
+    sysids = [vehicle.sysid for vehicle in mission.vehicles]
+    try:
+        ring.ensure(sysids)
+    except KeyRingError as problem:
+        if settings.keys is not None:
+            raise
+        events.add("security", f"{problem}; this flight has keys of its own", severity=Severity.WARNING)
+        ring = KeyRing(work_dir / "keys")
+        ring.ensure(sysids)
+    return ring
 
 
 def _first(group: BaseExceptionGroup) -> BaseException:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs import settings as chosen
+from gcs.commands.convert import convert
+from gcs.commands.replay import replay
 from gcs.errors import GcsError, UsageError
 from gcs.link.url import parse_link_url
 from missions.errors import MissionError
@@ -43,6 +45,9 @@ LinkOption = Annotated[
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="of planner and simulator: one seed, one plan")]
 InstanceOption = Annotated[int, typer.Option("--instance-base", min=0, max=10_000, help="shifts all ports")]
+KeysOption = Annotated[
+    Path | None, typer.Option("--keys", metavar="DIR", help="signing keys; see `gcs key`, which has the same option")
+]
 
 
 @app.command()
@@ -74,6 +79,7 @@ def fly(
         str, typer.Option(metavar="HOST", help="where they hear their lidars, at port 56300 and the following ones")
     ] = "127.0.0.1",
     instance_base: InstanceOption = 0,
+    keys: KeysOption = None,
 ) -> None:
     """Fly a mission.
 
@@ -113,6 +119,7 @@ def fly(
         faults=tuple(one for one in faults if isinstance(one, Fault)),
         simulator_faults=tuple(one for one in faults if isinstance(one, SimulatorFault)),
         instance_base=instance_base,
+        keys=keys,
         sensor=sensor,
         lidar_host=lidar_host,
     )
@@ -182,6 +189,7 @@ def check(mission: MissionArgument) -> None:
 def watch(
     link: LinkOption = None,
     port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
+    keys: KeysOption = None,
 ) -> None:
     """Show whatever is on the links in the web page, and command it from there.
 
@@ -194,11 +202,11 @@ def watch(
     from gcs.view.server import serve_page
     from gcs.watch import watch as run_watch
 
-    links = tuple(parse_link_url(text) for text in link or ()) or chosen.FlightSettings(mission="").ground_links()
+    settings = chosen.FlightSettings(mission="", links=tuple(parse_link_url(text) for text in link or ()), keys=keys)
     console = FlightConsole()
     events = EventLog(time.monotonic, listeners=[console.show])
     console.say(f"page: http://127.0.0.1:{port}")
-    asyncio.run(run_watch(links, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
+    asyncio.run(run_watch(settings, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
 
 
 @app.command()
@@ -258,6 +266,10 @@ def missions() -> None:
         print(f"{name:20} {load_mission(name).description}")
 
 
+app.command()(convert)
+app.command()(replay)
+
+
 def main() -> None:
     """Entry point of the console script: errors become a sentence and an exit code."""
     signal.signal(signal.SIGTERM, _as_interrupt)
@@ -275,7 +287,7 @@ def main() -> None:
 
 def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     from gcs.console import FlightConsole, PlanConsole
-    from gcs.flight.events import EventLog
+    from gcs.flight.events import BEGAN, EventLog
     from gcs.planner_process import PlannerProcess
 
     if isinstance(settings.origin, GeodeticPoint):
@@ -283,6 +295,7 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
     console = FlightConsole()
     with _work_dir(settings.report_dir) as work_dir, PlanConsole(console.console) as progress:
         events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
+        events.add(BEGAN, f"gcs fly {settings.mission}", unix_us=time.time_ns() // 1000)
         with PlannerProcess("ecpso", settings.seed, [progress.show]) as planner:
             report = asyncio.run(_fly(settings, mission, planner, events, work_dir))
         events.close()

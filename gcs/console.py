@@ -4,12 +4,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from gcs.flight.events import Event, Severity
+from gcs.flight.events import BEGAN, Event, Severity
 from gcs.planner.plan import FleetPlan
 from gcs.planner.plan import Progress as PlanProgress
 
 STYLES = {Severity.INFO: "", Severity.WARNING: "yellow", Severity.ERROR: "bold red"}
-QUIET_KINDS = {"command"}
+QUIET_KINDS = {BEGAN, "command"}
 """Events that go to the log alone."""
 
 

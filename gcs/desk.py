@@ -10,17 +10,18 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from gcs.dialect import AUTOPILOT, Mode, mavlink
+from gcs.dialect import AUTOPILOT, Mode
 from gcs.errors import GcsError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions
-from gcs.flight.events import EventLog, Severity
+from gcs.flight.events import EventLog, Severity, severity_of
 from gcs.flight.monitor import Phase
 from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trails
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.command_client import CommandClient
 from gcs.planner.plan import Progress
+from gcs.replay.player import Player
 from gcs.station import Station
 from missions.errors import MissionError
 from missions.mission import Mission
@@ -62,6 +63,8 @@ class Desk:
     """Of the plan that is being made, or was made last."""
     running: Intent | None = None
     """The step of the whole flight that is under way."""
+    player: Player | None = None
+    """What is shown is a recording: nothing can be commanded, but time can be moved."""
     simulated: bool = False
     """The vehicles fly in the bundled simulator, so what the mission keeps from its planners is there, too."""
 
@@ -83,16 +86,20 @@ class Desk:
         self.plan_progress.append(progress)
 
     def collect_texts(self) -> None:
-        """Take what the autopilots have said since the last call into the event log."""
+        """Take what the autopilots have said since the last call into the event log; a recording's log has it."""
+        if self.player is not None:
+            return
         for sysid, state in self.vehicles.items():
             heard_s = self._texts_heard_s.get(sysid, -math.inf)
             name = self._name(sysid)
             for said in [text for text in state.texts if text.time_s > heard_s]:
-                self.events.add("said", said.text, name, _severity(said.severity))
+                self.events.add("said", said.text, name, severity_of(said.severity))
                 self._texts_heard_s[sysid] = said.time_s
 
     def why_not(self, intent: Intent, sysids: Iterable[int] = ()) -> str | None:
         """Why an intent cannot be done now, as a phrase; None if it can."""
+        if self.player is not None:
+            return "this is a recording"
         if not intent.concerns_vehicles:
             return self._why_not_fleet(intent)
         chosen = list(sysids)
@@ -205,10 +212,3 @@ class Desk:
             return "nothing was interrupted"
         already = {Intent.HOLD: Mode.HOLD, Intent.RTL: Mode.RTL, Intent.LAND: Mode.LAND}.get(intent)
         return f"already in {state.mode.name.lower()}" if already is state.mode else None
-
-
-def _severity(mav_severity: int) -> Severity:
-    """Of a STATUSTEXT: MAV_SEVERITY counts downwards from 7, debug."""
-    if mav_severity <= mavlink.MAV_SEVERITY_ERROR:
-        return Severity.ERROR
-    return Severity.WARNING if mav_severity == mavlink.MAV_SEVERITY_WARNING else Severity.INFO

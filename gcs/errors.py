@@ -9,6 +9,27 @@ class UsageError(GcsError):
     """The operator asked for something that cannot be: exit code 2, nothing was sent."""
 
 
+class KeyRingError(UsageError):
+    """Signing keys that cannot be read, or be kept."""
+
+
+class BadFile(UsageError):
+    """A file that cannot be used.
+
+    Args:
+        name: of the file.
+        where: line, key or item; empty for the file as a whole.
+        problem: what was expected and what was found.
+    """
+
+    def __init__(self, name: str, where: str, problem: str) -> None:
+        super().__init__(": ".join(part for part in (name, where, problem) if part))
+
+
+class RecordingError(UsageError):
+    """A recording that cannot be read, or has nothing whole in it."""
+
+
 class LinkLost(GcsError):
     """No answer, in spite of repeated requests."""
 

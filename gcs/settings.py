@@ -5,6 +5,7 @@ from pathlib import Path
 
 import msgspec
 
+from gcs.folders import key_folder
 from gcs.link.url import LinkUrl, Scheme
 from missions.faults import Fault, SimulatorFault
 from missions.frames import GeodeticPoint
@@ -62,6 +63,8 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     simulator_faults: tuple[SimulatorFault, ...] = ()
     """Beside those of the mission."""
     instance_base: int = 0
+    keys: Path | None = None
+    """Folder of the signing keys; None for the usual one."""
     sensor: SensorKind = SensorKind.LIDAR
     """Of the companions that are started."""
     lidar_host: str = "127.0.0.1"
@@ -79,3 +82,11 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     def ground_links(self) -> tuple[LinkUrl, ...]:
         """The links that were asked for, or the usual port on loopback."""
         return self.links or (LinkUrl(Scheme.UDP_IN, "127.0.0.1", 14550 + self.instance_base),)
+
+    def key_folder(self) -> Path:
+        """The ring of keys: that which was named, or the usual one; simulated vehicles have one of their own."""
+        if self.keys is not None:
+            return self.keys
+        if self.autopilots is not Autopilots.SIMULATED:
+            return key_folder("vehicles")
+        return key_folder(f"sim-{self.instance_base}" if self.instance_base else "sim")

@@ -81,7 +81,7 @@ class Station:
         route = self._routes.get(sysid)
         if route is not None:
             connection, address = route
-            self._transmit(message, connection, address)
+            self._transmit(message, connection, address, sysid)
             self.sent[sysid] += 1
 
     async def run(self, service: S) -> S:
@@ -108,8 +108,8 @@ class Station:
             mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
         )
         while True:
-            for connection, address in self._destinations():
-                self._transmit(heartbeat, connection, address)
+            for (connection, address, _), sysid in self._destinations().items():
+                self._transmit(heartbeat, connection, address, sysid)
             await asyncio.sleep(HEARTBEAT_INTERVAL_S)
 
     async def holds_within(self, condition: Callable[[], bool], timeout_s: float, poll_s: float = 0.02) -> bool:
@@ -156,14 +156,18 @@ class Station:
         for message in messages:
             self.send(message, sysid)
 
-    def _transmit(self, message: Message, connection: Connection, address: Address) -> None:
-        frame = self.codec.pack(message)
+    def _transmit(self, message: Message, connection: Connection, address: Address, sysid: int) -> None:
+        frame = self.codec.pack(message, sysid)
         if self.recording is not None:
             self.recording.write(frame, self.unix_us())
         connection.send(frame, address)
 
-    def _destinations(self) -> set[tuple[Connection, Address]]:
-        """Everybody who was heard, and the peers of connections on which nobody was heard yet."""
-        heard = set(self._routes.values())
-        silent = {(c, c.peer) for c in self.connections if c.peer is not None}
-        return heard | silent
+    def _destinations(self) -> dict[tuple[Connection, Address, bytes | None], int]:
+        """Everybody who was heard, and the peers of connections on which nobody was heard yet.
+
+        Where several vehicles are behind one address, one of them stands for all that have its key.
+        """
+        routes = set(self._routes.values())
+        silent = {(c, c.peer, None): 0 for c in self.connections if c.peer is not None and (c, c.peer) not in routes}
+        heard = {(*route, self.codec.signing.key(sysid)): sysid for sysid, route in self._routes.items()}
+        return silent | heard

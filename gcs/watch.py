@@ -6,34 +6,37 @@ from contextlib import AsyncExitStack
 from gcs.app import TRAIL_INTERVAL_S, Page
 from gcs.desk import Desk
 from gcs.flight.events import EventLog
+from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.trails import Trails
 from gcs.link.udp import open_udp
-from gcs.link.url import LinkUrl
+from gcs.security.key_ring import KeyRing
+from gcs.settings import FlightSettings
 from gcs.station import Station
 from missions.frames import LocalFrame
 
 
-async def watch(links: tuple[LinkUrl, ...], events: EventLog, page: Page) -> None:
+async def watch(settings: FlightSettings, events: EventLog, page: Page) -> None:
     """Serve the page until cancelled.
 
     Raises:
-        UsageError: a port in use.
+        UsageError: a port in use, or a key ring that cannot be used.
     """
     station = Station()
+    station.codec.signing = KeyRing(settings.key_folder()).signing(station.unix_us)
     desk = Desk(station, events)
     async with AsyncExitStack() as stack:
-        for url in links:
+        for url in settings.ground_links():
             connection = await open_udp(url, station.receive)
             stack.callback(connection.close)
             station.connections.append(connection)
             events.add("link", f"listening on {url}")
         async with asyncio.TaskGroup() as group:
             group.create_task(station.send_heartbeats(), name="heartbeats")
-            group.create_task(_sample_trails(desk), name="trails")
+            group.create_task(_sample_trails(desk, SecurityWatch(station, events)), name="trails")
             await page(desk, asyncio.Event())
 
 
-async def _sample_trails(desk: Desk) -> None:
+async def _sample_trails(desk: Desk, security: SecurityWatch) -> None:
     """Without a mission, the frame is that of the first vehicle's home."""
     while True:
         if desk.trails is None:
@@ -42,4 +45,5 @@ async def _sample_trails(desk: Desk) -> None:
         else:
             desk.trails.sample(desk.station.fleet, {})
         desk.collect_texts()
+        security.look(desk.station.now_s)
         await asyncio.sleep(TRAIL_INTERVAL_S)

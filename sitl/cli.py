@@ -2,10 +2,7 @@
 
 import asyncio
 import sys
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -18,11 +15,12 @@ from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
 from missions.ports import FIRST_COMPANION_PORT
+from sitl.announcement import announced_compilation
 from sitl.autopilot.memory import Memory, SigningMemory
 from sitl.autopilot.parameter_table import parameter_table
 from sitl.dynamics.airframe import AirframeName
 from sitl.errors import SitlError
-from sitl.lean_numba import leave_scipy_out
+from sitl.lean_numba import leave_out_what_no_kernel_needs
 from sitl.link.memory_files import MemoryFiles
 from sitl.open_field import open_field
 from sitl.service import serve
@@ -37,8 +35,6 @@ from sitl.signing_keys import load_signing_keys
 from sitl.simulator import Simulator
 
 BAD_USAGE = 2
-PATIENCE_S = 2.0
-"""Compiling that takes longer than this is announced."""
 
 EPILOG = "Examples:  sitl indoor  |  sitl --vehicles 3 --speed 5  |  sitl field --truth truth.csv --airframe sih"
 
@@ -125,13 +121,13 @@ def fly(
 
 def main() -> None:
     """Entry point of the `sitl` command."""
-    leave_scipy_out()
+    leave_out_what_no_kernel_needs()
     app()
 
 
 def warm_simulator(mission: Mission, settings: Settings, memories: dict[int, Memory]) -> Simulator:
     """A simulator whose compiled code is there, so that its first step takes no longer than the others."""
-    with _announced("sitl: compiling the physics, on a machine's first run only"), one_at_a_time("sitl"):
+    with announced_compilation("sitl: compiling the physics, on a machine's first run only"), one_at_a_time("sitl"):
         Simulator(
             _rehearsed(mission), seed=settings.seed, airframe=settings.airframe.airframe, lidar=settings.lidar
         ).step()
@@ -191,22 +187,3 @@ def _ports(text: str) -> tuple[int, int]:
         expected = f"two ports from 1024 to {HIGHEST_ONBOARD_PORT}, as in {ONBOARD_PORT}:{FIRST_COMPANION_PORT}"
         raise typer.BadParameter(f"--onboard-ports: expected {expected}, found {text!r}")
     return int(own), int(peer)
-
-
-@contextmanager
-def _announced(text: str) -> Iterator[None]:
-    """Say on standard error what takes so long, and for how long already, if it takes long."""
-    over = threading.Event()
-    begun_s = time.monotonic()
-
-    def announce() -> None:
-        while not over.wait(PATIENCE_S):
-            print(f"{text} ({time.monotonic() - begun_s:.0f} s)", file=sys.stderr, flush=True)
-
-    thread = threading.Thread(target=announce, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()

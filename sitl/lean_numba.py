@@ -1,23 +1,25 @@
-"""numba without SciPy, for a program that must be small.
+"""numba without SciPy and cffi, for a program that must be small and start quickly.
 
 numba looks for a BLAS when it loads its array functions, and imports SciPy's linear algebra for it: 17 MB of memory and
-a fifth of a second. No kernel of the simulator multiplies matrices by BLAS; one that did would fail to compile, saying
-so. Only the program does this, never the library: other code in the same process may need what is left out here.
+a fifth of a second. It looks for cffi, too, to call what that has wrapped: a parser of C, for nothing. No kernel of the
+simulator multiplies matrices by BLAS or calls C; one that did would fail to compile, saying so. Only the program does
+this, never the library: other code in the same process may need what is left out here.
 """
 
 import importlib
 import sys
 
-LEFT_OUT = "scipy.linalg"
-_ASKS_FOR_IT = "numba.np.arraymath"
+ASKS_FOR = {"scipy.linalg": "numba.np.arraymath", "cffi": "numba.core.typing.cffi_utils"}
+"""What is left out -> the module of numba that would import it."""
 
 
-def leave_scipy_out() -> None:
-    """Load numba's array functions as on a machine without SciPy; afterwards SciPy can be imported as ever."""
-    if LEFT_OUT in sys.modules:
-        return
-    sys.modules[LEFT_OUT] = None  # pyright: ignore[reportArgumentType] - an import of None is refused
-    try:
-        importlib.import_module(_ASKS_FOR_IT)
-    finally:
-        del sys.modules[LEFT_OUT]
+def leave_out_what_no_kernel_needs() -> None:
+    """Load parts of numba as on a machine without SciPy and cffi; afterwards both can be imported as ever."""
+    for left_out, asks_for_it in ASKS_FOR.items():
+        if left_out in sys.modules:
+            continue
+        sys.modules[left_out] = None  # pyright: ignore[reportArgumentType] - an import of None is refused
+        try:
+            importlib.import_module(asks_for_it)
+        finally:
+            del sys.modules[left_out]

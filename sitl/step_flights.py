@@ -1,6 +1,7 @@
 """The steps that a real PX4 was measured with, flown by MAVLink on one calm vehicle, and what is read off each."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +21,12 @@ Array = npt.NDArray[np.float64]
 NAN = math.nan
 POSITION, VELOCITY = 0x9F8, 0x9C7
 """Type masks: position and yaw, velocity and yaw."""
+STREAM_S = 0.05
+"""Setpoints are repeated this often; a change waits for half of it, as it does on average in such a stream."""
+CALM = Positioning(horizontal_std_m=0.0, vertical_std_m=0.0, velocity_std_m_s=0.0)
+"""Of an estimator that knows everything."""
+GNSS = Positioning(horizontal_std_m=0.45, vertical_std_m=0.45, velocity_std_m_s=0.08, correlation_s=7.0)
+"""Of one on a GNSS receiver like the one in PX4's simulation in hardware."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +48,11 @@ class Recording:
 class Pilot:
     """Flies one vehicle of the simulator by MAVLink, and watches where it really goes."""
 
-    def __init__(self, airframe: Airframe) -> None:
-        self._simulator = Simulator(calm(open_field(1)), seed=1, airframe=airframe)
+    def __init__(self, airframe: Airframe, positioning: Positioning = CALM) -> None:
+        self._simulator = Simulator(located(open_field(1), positioning), seed=1, airframe=airframe)
         self._codec = mavlink.MAVLink(None, 1, 191)
         self._setpoint: Message | None = None
+        self._send_s = 0.0
         self.disarmed_s = 0.0
         """Simulated time until which the vehicle has been armed."""
         self.wait(1.0)
@@ -72,6 +80,7 @@ class Pilot:
         motion = (*position_m.tolist(), *velocity_m_s.tolist(), 0.0, 0.0, 0.0)
         message: Any = mavlink.MAVLink_set_position_target_local_ned_message
         self._setpoint = message(0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, mask, *motion, yaw_rad, 0.0)
+        self._send_s = self.time_s + 0.5 * STREAM_S
 
     def go_offboard(self) -> None:
         """Hover in Offboard, where the vehicle is, after a take-off to 20 m."""
@@ -87,19 +96,32 @@ class Pilot:
         self.order(POSITION, np.array([0.0, 0.0, -20.0]), np.zeros(3))
 
     def wait(self, duration_s: float) -> Recording:
-        """Let time pass; setpoints are repeated at 20 Hz."""
+        """Let time pass, setpoints going out; where the vehicle really goes."""
+        return self._record(duration_s, self._state)
+
+    def watch(self, duration_s: float) -> Recording:
+        """The same as the vehicle itself sees it."""
+        return self._record(duration_s, self._estimate)
+
+    def _record(self, duration_s: float, state: Callable[[], tuple[float, ...]]) -> Recording:
         begin_s = self._simulator.time_s
         rows: list[tuple[float, ...]] = []
         while self._simulator.time_s < begin_s + duration_s - 1e-9:
-            if self._setpoint is not None and round(self._simulator.time_s / 0.02) % 2 == 0:
+            if self._setpoint is not None and self.time_s > self._send_s - 1e-9:
+                self._send_s += STREAM_S
                 self.send(self._setpoint)
             self._simulator.step()
             self._simulator.transmissions()
-            rows.append((self._simulator.time_s - begin_s, *self._state()))
+            rows.append((self._simulator.time_s - begin_s, *state()))
             if self._simulator.vehicles[1].autopilot.armed:
                 self.disarmed_s = self._simulator.time_s
         table = np.array(rows)
         return Recording(table[:, 0], table[:, 1:4], table[:, 4:7], table[:, 7], table[:, 8])
+
+    def _estimate(self) -> tuple[float, ...]:
+        s = self._simulator.vehicles[1].autopilot.snapshot
+        tilt = math.degrees(math.acos(math.cos(s.roll_rad) * math.cos(s.pitch_rad)))
+        return s.x_m, s.y_m, s.z_m, s.vx_m_s, s.vy_m_s, s.vz_m_s, tilt, math.degrees(s.yaw_rad)
 
     def _state(self) -> tuple[float, ...]:
         truth = self._simulator.truth
@@ -111,10 +133,30 @@ class Pilot:
         return north, east, -up, vn, ve, -vu, tilt, yaw
 
 
-def calm(mission: Mission) -> Mission:
-    """The mission with estimators that know everything."""
-    exact = Positioning(horizontal_std_m=0.0, vertical_std_m=0.0, velocity_std_m_s=0.0)
-    return msgspec.structs.replace(mission, simulation=Simulation(positioning=exact))
+def hover(airframe: Airframe, *, offboard: bool) -> dict[str, float]:
+    """Hovering on noisy estimates in Hold or Offboard, as the estimates show it: means over several times 30 s."""
+    pilot = Pilot(airframe, GNSS)
+    pilot.go_offboard()
+    if not offboard:
+        pilot.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 4, 3)
+        pilot.wait(5.0)
+    hovers = [pilot.watch(30.0) for _ in range(10)]
+    place = np.array([0.0, 0.0, -20.0])
+    off = [(r.position_m - (place if offboard else r.position_m.mean(axis=0))) for r in hovers]
+    position = np.mean([np.sqrt((one**2).mean(axis=0)) for one in off], axis=0)
+    velocity = np.mean([np.sqrt((r.velocity_m_s**2).mean(axis=0)) for r in hovers], axis=0)
+    return {
+        "across m": float(np.hypot(position[0], position[1]) / math.sqrt(2.0)),
+        "height m": float(position[2]),
+        "across m/s": float(np.hypot(velocity[0], velocity[1]) / math.sqrt(2.0)),
+        "climb m/s": float(velocity[2]),
+        "peak tilt deg": float(np.mean([r.tilt_deg.max() for r in hovers])),
+    }
+
+
+def located(mission: Mission, positioning: Positioning) -> Mission:
+    """The mission with estimators that are this good."""
+    return msgspec.structs.replace(mission, simulation=Simulation(positioning=positioning))
 
 
 def position_step(airframe: Airframe, axis: int, distance_m: float) -> dict[str, float]:
@@ -167,8 +209,12 @@ def brake(airframe: Airframe, speed_m_s: float) -> dict[str, float]:
     pilot.order(VELOCITY, np.zeros(3), np.zeros(3))
     r = pilot.wait(7.0)
     slowed = 1.0 - r.velocity_m_s[:, 0] / r.velocity_m_s[0, 0]
-    distance = float(r.position_m[-1, 0] - begin[0])
-    return {"t63 s": r.time_to(slowed, 0.63), "distance m": distance, "peak tilt deg": float(r.tilt_deg.max())}
+    return {
+        "t63 s": r.time_to(slowed, 0.63),
+        "t90 s": r.time_to(slowed, 0.9),
+        "distance m": float(r.position_m[-1, 0] - begin[0]),
+        "peak tilt deg": float(r.tilt_deg.max()),
+    }
 
 
 def yaw_step(airframe: Airframe) -> dict[str, float]:

@@ -66,6 +66,7 @@ class Vehicle:
         memory: Memory,
     ) -> None:
         self.sysid = sysid
+        self._body = body
         self._utc_start_us = utc_start_us
         self._positioning = positioning
         self.outbox = Outbox(sysid)
@@ -206,7 +207,14 @@ class Vehicle:
     def _moment(self) -> Moment:
         utc_us = self._utc_start_us + round(self._now_s * 1e6)
         return Moment(
-            self.autopilot, self._snapshot, self._now_s, utc_us, self._positioning, self.sysid, self.surroundings
+            self.autopilot,
+            self._snapshot,
+            self._now_s,
+            utc_us,
+            self._positioning,
+            self.sysid,
+            self._body,
+            self.surroundings,
         )
 
 

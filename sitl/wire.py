@@ -35,6 +35,12 @@ class Layout:
     """Documented field order -> wire order; None where they are the same."""
     has_arrays: bool
 
+    @classmethod
+    def of_own(cls, name: str, message_id: int, crc_extra: int, payload: struct.Struct) -> "Layout":
+        """The layout of a message that the dialect lacks; its values come in wire order, arrays opened up."""
+        id_bytes = message_id.to_bytes(3, "little")
+        return cls(name, message_id, id_bytes, bytes([crc_extra]), payload.pack, None, has_arrays=False)
+
 
 def _wire_types(kind: Any) -> list[str]:
     """Field types in wire order, in which `array_lengths` stand."""

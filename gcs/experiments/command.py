@@ -34,13 +34,26 @@ class Order:
 
 
 def run_experiment(order: Order, console: Console) -> None:
-    """Do the runs that are not done yet, and write NAME.csv, NAME.md and pictures.
+    """Do the runs of a shipped experiment that are not done yet, and write NAME.csv, NAME.md and pictures.
 
     Raises:
         UsageError: before anything is run, if it cannot be.
         ProcessFailed: a worker has ended by itself.
     """
     experiment = find_experiment(order.name)
+    again = f"gcs experiment {order.name} --runs {order.runs or experiment.default_runs} --seed0 {order.seed0}"
+    conduct(experiment, order, console, again)
+
+
+def conduct(experiment: Experiment, order: Order, console: Console, command: str) -> list[Row]:
+    """As `run_experiment`, for any experiment; the rows of all runs that were asked for.
+
+    Args:
+        experiment: what is run.
+        order: its `name` is not read.
+        console: for the progress.
+        command: that does the same again, for its summary.
+    """
     if order.executor is not None:
         check_scheduler(order.executor)
     _make(order.output)
@@ -52,8 +65,10 @@ def run_experiment(order: Order, console: Console) -> None:
         if todo:
             with open_executor(order.executor) as executor, RunConsole(console, experiment, len(todo)) as progress:
                 perform(experiment, todo, ledger, executor, progress.show)
-        for path in _write_results(experiment, wanted(experiment, seeds, ledger), order):
+        rows = wanted(experiment, seeds, ledger)
+        for path in _write_results(experiment, rows, order, command):
             console.print(str(path), markup=False)
+        return rows
 
 
 class RunConsole:
@@ -97,10 +112,9 @@ def _make(directory: Path) -> None:
         raise UsageError(f"--output {directory}: cannot be made: {problem.strerror}") from None
 
 
-def _write_results(experiment: Experiment, rows: list[Row], order: Order) -> list[Path]:
+def _write_results(experiment: Experiment, rows: list[Row], order: Order, command: str) -> list[Path]:
     pictures = experiment.figures(rows, order.output)
-    again = f"gcs experiment {order.name} --runs {order.runs or experiment.default_runs} --seed0 {order.seed0}"
     summary = order.output / f"{experiment.name}.md"
-    head = f"# {experiment.title}\n\n`{again}`: {len(rows)} runs, in {experiment.name}.csv."
+    head = f"# {experiment.title}\n\n`{command}`: {len(rows)} runs, in {experiment.name}.csv."
     summary.write_text(f"{head}\n\n{experiment.summary(rows)}\n", encoding="utf-8")
     return [order.output / f"{experiment.name}.csv", summary, *(order.output / name for name in pictures)]

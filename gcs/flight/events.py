@@ -8,6 +8,11 @@ from typing import Any, TextIO
 
 import msgspec
 
+from gcs.dialect import mavlink
+
+BEGAN = "began"
+"""The event with which a program's log begins: its `unix_us` tells when that was."""
+
 
 class Severity(Enum):
     """How much an event matters to an operator."""
@@ -61,3 +66,10 @@ class EventLog:
     def close(self) -> None:
         if self._file is not None:
             self._file.close()
+
+
+def severity_of(mav_severity: int) -> Severity:
+    """Of a STATUSTEXT: MAV_SEVERITY counts downwards from 7, debug."""
+    if mav_severity <= mavlink.MAV_SEVERITY_ERROR:
+        return Severity.ERROR
+    return Severity.WARNING if mav_severity == mavlink.MAV_SEVERITY_WARNING else Severity.INFO

@@ -4,6 +4,7 @@ import struct
 from dataclasses import dataclass, field
 
 from gcs.dialect import GCS_COMPONENT, GCS_SYSTEM, Message, mavlink
+from gcs.security.signing import Signing
 
 MAVLINK_2 = 0xFD
 
@@ -33,13 +34,14 @@ class SourceCount:
 class Codec:
     """One end of MAVLink 2; the ground station's, unless said otherwise.
 
-    Malformed, truncated and MAVLink 1 frames are counted and dropped.
+    Malformed, truncated and MAVLink 1 frames are counted and dropped, and so is what `signing` does not admit.
     """
 
     system: int = GCS_SYSTEM
     component: int = GCS_COMPONENT
     malformed: int = 0
     sources: dict[tuple[int, int], SourceCount] = field(default_factory=dict)
+    signing: Signing = field(default_factory=Signing)
 
     def __post_init__(self) -> None:
         self._sender = mavlink.MAVLink(None, self.system, self.component)
@@ -58,8 +60,12 @@ class Codec:
             self._parser = _new_parser()
         return [message for message in messages if self._accept(message)]
 
-    def pack(self, message: Message) -> bytes:
-        """The frame of a message of ours, with the next sequence number."""
+    def pack(self, message: Message, sysid: int = 0) -> bytes:
+        """The frame of a message of ours, with the next sequence number, signed if the vehicle `sysid` has a key."""
+        signature, key = self._sender.signing, self.signing.key(sysid)
+        signature.sign_outgoing, signature.secret_key = key is not None, key
+        if key is not None:
+            signature.timestamp = self.signing.next_timestamp(sysid)
         frame = message.pack(self._sender)
         self._sender.seq = (self._sender.seq + 1) % 256
         return bytes(frame)
@@ -68,6 +74,8 @@ class Codec:
         frame = message.get_msgbuf()
         if message.get_type() == "BAD_DATA" or frame[0] != MAVLINK_2:
             self.malformed += 1
+            return False
+        if not self.signing.admits(frame):
             return False
         seq, system, component = frame[4:7]  # from the frame: pymavlink leaves the header of unknown messages empty
         self.sources.setdefault((system, component), SourceCount()).count(seq)

@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from html import escape
 from itertools import islice
 
-from gcs.flight.events import Event, Severity
+from gcs.flight.events import BEGAN, Event, Severity
 from gcs.view.colours import Rgb, css
 
 SHOWN = 30
 MINUTE_S = 60
 
-QUIET_KINDS = {"stream"}
+QUIET_KINDS = {BEGAN, "stream"}
 """Of use in the log file alone."""
 
 _CLASSES = {Severity.INFO: "info", Severity.WARNING: "warn", Severity.ERROR: "bad"}

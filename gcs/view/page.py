@@ -66,19 +66,20 @@ class Page:
         self._panels = Panels(server, desk, self._press, self._views())
 
     def update(self, now_s: float) -> None:
-        """Bring the page up to date."""
+        """Bring the page up to date; what is shown has the station's clock, which in a recording can be moved."""
+        shown_s = self._desk.station.now_s
         self._seen = sightings(self._desk)
         lens = self._cameras.lens()
         with self._server.atomic():
             self._vehicles.move(self._seen, lens)
-            self._motion.update(self._desk, self._seen, now_s)
+            self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + TELL_INTERVAL_S
                 self._desk.collect_texts()
                 self._show_plan()
-                self._tags.show([*self._vehicle_tags(now_s), *self._target_tags], lens)
-                self._panels.update(self._seen, now_s)
+                self._tags.show([*self._vehicle_tags(shown_s), *self._target_tags], lens)
+                self._panels.update(self._seen, shown_s)
             self._tags.move(
                 np.array([tagged.position_m for tagged in self._seen] + self._targets_m).reshape(-1, 3), lens
             )

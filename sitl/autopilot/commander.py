@@ -78,12 +78,17 @@ class Commander:
         self._mode_after_disarm = Mode.HOLD
         self._landed_since_s: float | None = None
         self._flown_since_arming = False
-        self._airborne_s = 0.0
         self._sticks_expected = False
         """Whether there have been sticks since arming: who arms without does not miss them."""
         self._terminated_s: float | None = None
         self.intended = Mode.HOLD
         self.armed = False
+        self.armed_s: float | None = None
+        """When this or the last flight was armed for."""
+        self.airborne_s: float | None = None
+        """When it left the ground."""
+        self.n_armed = 0
+        """How often, since boot."""
 
     # ------------------------------------------------------------------ state
     @property
@@ -142,6 +147,8 @@ class Commander:
             self._say(Severity.CRITICAL, "Arming denied: high throttle")
             return Result.TEMPORARILY_REJECTED
         self.armed = True
+        self.armed_s, self.airborne_s = self._now_s, None
+        self.n_armed += 1
         self._flown_since_arming, self._landed_since_s = False, None
         self._sticks_expected = False
         self._failsafes.clear()
@@ -213,9 +220,10 @@ class Commander:
     def _fly_on(self) -> None:
         """In the air: an attitude that fails right after take-off stops the motors."""
         if not self._flown_since_arming:
-            self._airborne_s = self._now_s
+            self.airborne_s = self._now_s
         self._flown_since_arming, self._landed_since_s = True, None
-        if self._situation.attitude_failed and self._now_s - self._airborne_s < self._parameters["COM_LKDOWN_TKO"]:
+        airborne_s = self._now_s - (self.airborne_s or 0.0)
+        if self._situation.attitude_failed and airborne_s < self._parameters["COM_LKDOWN_TKO"]:
             self.disarm("lockdown", forced=True)
 
     def _let_pilot_take_over(self) -> None:

@@ -32,13 +32,13 @@ class Navigator:
         self._fence = fence
         self._takeoff = Takeoff(craft)
         self._hold = Hold(craft)
-        self._orbit = Orbit(craft)
+        self.orbit = Orbit(craft)
         self.follow = Follow(craft)
         self.mission = MissionFlight(craft, on_reached)
         self._modes: dict[Mode, FlightMode] = {
             Mode.TAKEOFF: self._takeoff,
             Mode.HOLD: self._hold,
-            Mode.ORBIT: self._orbit,
+            Mode.ORBIT: self.orbit,
             Mode.FOLLOW: self.follow,
             Mode.LAND: Land(craft),
             Mode.RTL: Return(craft),
@@ -61,7 +61,7 @@ class Navigator:
 
     def order_orbit(self, order: OrbitOrder) -> None:
         """DO_ORBIT: for when Orbit is flown, now or very soon."""
-        self._orbit.order(order)
+        self.orbit.order(order)
 
     def reposition(self, target: LocalPoint, yaw_rad: float, s: Snapshot, now_s: float) -> None:
         """DO_REPOSITION: for Hold, now or very soon; a NaN coordinate keeps what there is, all NaN is a pause."""

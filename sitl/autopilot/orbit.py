@@ -47,6 +47,11 @@ class Orbit:
         """DO_ORBIT: for when Orbit is flown, now or very soon."""
         self._ordered, self._is_new = order, True
 
+    @property
+    def circle(self) -> tuple[LocalPoint, float]:
+        """Its centre, and its radius [m], negative for counter-clockwise."""
+        return self._centre, math.copysign(self._radius_m, self._full_speed_m_s)
+
     def start(self, s: Snapshot, now_s: float) -> None:
         self._is_new = True
 

@@ -66,6 +66,12 @@ class Parameters:
             self._apply(name)
         return changed
 
+    def reset(self) -> None:
+        """Every parameter gets its default back."""
+        for name, parameter in self._table.items():
+            self.set(name, _as_stored(parameter.default))
+        self._kept.clear()
+
     def encoded(self, name: str) -> tuple[bytes, int]:
         """The four bytes of a PARAM_VALUE's `param_value`, and its `param_type`; integers take the float's place."""
         kind = MAV_PARAM_TYPE_INT32 if self.is_int(name) else MAV_PARAM_TYPE_REAL32

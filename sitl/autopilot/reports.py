@@ -12,6 +12,7 @@ class Result(IntEnum):
     DENIED = 2
     UNSUPPORTED = 3
     FAILED = 4
+    CANCELLED = 6
 
 
 class Severity(IntEnum):

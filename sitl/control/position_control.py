@@ -15,6 +15,9 @@ from sitl.dynamics.state import Guidance, TakeoffStage
 TILT_SLEW_RAD_S = 0.2
 LEAST_THRUST = 1e-3
 """A thrust vector is never shorter than this, so that an attitude can be read off it."""
+DRAG_SHARE = 0.5
+"""How much of a horizontal integral is taken for what holds against drag; the rest may hold against wind."""
+SLOWEST_WITH_DRAG_M_S = 0.1
 
 _READY, _RAMPUP, _FLIGHT = int(TakeoffStage.READY), int(TakeoffStage.RAMPUP), int(TakeoffStage.FLIGHT)
 _WAYPOINT, _LAND = int(Guidance.WAYPOINT), int(Guidance.LAND)
@@ -210,6 +213,7 @@ def _integrate_velocity_error(
         gain = 2.0 / g.MPC_XY_VEL_P_ACC
         error_x -= gain * (a[0] - produced_x)
         error_y -= gain * (a[1] - produced_y)
+    _let_go_of_drag(v, dt_s)
     if not math.isnan(error_x):
         integral[0] += g.MPC_XY_VEL_I_ACC * error_x * dt_s
         integral[1] += g.MPC_XY_VEL_I_ACC * error_y * dt_s
@@ -218,3 +222,19 @@ def _integrate_velocity_error(
     if not math.isnan(error_z):
         integral[2] += g.MPC_Z_VEL_I_ACC * error_z * dt_s
     integral[2] = min(max(integral[2], -GRAVITY_M_S2), GRAVITY_M_S2)
+
+
+@compiled
+def _let_go_of_drag(v: Any, dt_s: float) -> None:
+    """While a trajectory brakes, what the integrals hold against drag shrinks as its speed does.
+
+    A velocity integral that has learnt the drag of a cruise carries a vehicle metres past its target otherwise.
+    """
+    w, a, integral = v.setpoint_velocity_m_s, v.setpoint_acceleration_m_s2, v.velocity_integral_m_s2
+    speed2 = w[0] * w[0] + w[1] * w[1]
+    braking = -(w[0] * a[0] + w[1] * a[1])
+    pushes = w[0] * integral[0] + w[1] * integral[1] > 0.0
+    if braking > 0.0 and pushes and speed2 > SLOWEST_WITH_DRAG_M_S * SLOWEST_WITH_DRAG_M_S:  # false for NaN
+        keep = max(1.0 - DRAG_SHARE * braking / speed2 * dt_s, 0.0)
+        integral[0] *= keep
+        integral[1] *= keep

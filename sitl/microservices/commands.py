@@ -156,6 +156,37 @@ def _look_ahead(server: CommandServer, command: Command, sender: Sender) -> Resu
     return Result.ACCEPTED
 
 
+def _look(server: CommandServer, command: Command, sender: Sender) -> Result:
+    """DO_SET_ROI, the old command: a place, or none; at other things no nose can be turned."""
+    wanted = _number(command.params[0])
+    if wanted == mavlink.MAV_ROI_LOCATION:
+        return _look_at(server, command, sender)
+    return _look_ahead(server, command, sender) if wanted == mavlink.MAV_ROI_NONE else Result.UNSUPPORTED
+
+
+def _change_altitude(server: CommandServer, command: Command, sender: Sender) -> Result:
+    """Hold, here, at another altitude; AMSL whatever the frame, as for DO_REPOSITION."""
+    here = (-1.0, float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE), 0.0, math.nan, math.nan, math.nan)
+    return _reposition(server, Command(command.number, (*here, command.params[0])), sender)
+
+
+def _cancelled(server: CommandServer, command: Command, sender: Sender) -> Result:
+    """DO_LAND_START: there are no landing patterns to jump to."""
+    return Result.CANCELLED
+
+
+def _store_parameters(server: CommandServer, command: Command, sender: Sender) -> Result:
+    """0 reads and 1 writes, which happens by itself; 2 and 4 go back to the defaults, 3 to those of sensors."""
+    wanted = _number(command.params[0])
+    if server.autopilot.armed:
+        return Result.TEMPORARILY_REJECTED
+    if wanted not in range(5):
+        return Result.DENIED
+    if wanted in (2, 4):
+        server.autopilot.parameters.reset()
+    return Result.ACCEPTED
+
+
 def _check(server: CommandServer, command: Command, sender: Sender) -> Result:
     server.autopilot.refresh()
     return Result.ACCEPTED
@@ -195,8 +226,8 @@ def _request_message(server: CommandServer, command: Command, sender: Sender) ->
     stream = BY_ID.get(number)
     if stream is None or number in NOT_ON_REQUEST:
         return Result.DENIED
-    server.streams[sender.link].send_now(stream.name, server.moment())
-    return Result.ACCEPTED
+    sent = server.streams[sender.link].send_now(stream.name, server.moment())
+    return Result.ACCEPTED if sent else Result.DENIED
 
 
 def _request_named(name: str) -> Handler:
@@ -260,6 +291,11 @@ HANDLERS: dict[int, Handler] = {
     _m.MAV_CMD_DO_ORBIT: _orbit,
     _m.MAV_CMD_DO_SET_ROI_LOCATION: _look_at,
     _m.MAV_CMD_DO_SET_ROI_NONE: _look_ahead,
+    _m.MAV_CMD_DO_SET_ROI: _look,
+    _m.MAV_CMD_DO_CHANGE_ALTITUDE: _change_altitude,
+    _m.MAV_CMD_DO_LAND_START: _cancelled,
+    _m.MAV_CMD_DO_GO_AROUND: _nothing_to_do,
+    _m.MAV_CMD_PREFLIGHT_STORAGE: _store_parameters,
     _m.MAV_CMD_DO_SET_ACTUATOR: _nothing_to_do,
     _m.MAV_CMD_RUN_PREARM_CHECKS: _check,
     _m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
@@ -268,6 +304,8 @@ HANDLERS: dict[int, Handler] = {
     _m.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
     _m.MAV_CMD_GET_HOME_POSITION: _request_named("HOME_POSITION"),
     _m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_named("AUTOPILOT_VERSION"),
+    _m.MAV_CMD_REQUEST_PROTOCOL_VERSION: _request_named("PROTOCOL_VERSION"),
+    _m.MAV_CMD_REQUEST_FLIGHT_INFORMATION: _request_named("FLIGHT_INFORMATION"),
     _m.MAV_CMD_DO_VTOL_TRANSITION: _silence,
     _m.MAV_CMD_DO_GRIPPER: _silence,
     _m.MAV_CMD_INJECT_FAILURE: _inject_failure,

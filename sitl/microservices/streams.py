@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from sitl.microservices import telemetry
+from sitl.microservices import telemetry, telemetry_on_demand
 from sitl.microservices.outbox import Link, Outbox
 from sitl.microservices.telemetry import Build, Moment
 from sitl.wire import LAYOUTS, Layout
@@ -51,20 +51,45 @@ STREAMS = (
     Stream("AUTOPILOT_VERSION", telemetry.autopilot_version, 0.0, 0.0),
     Stream("OBSTACLE_DISTANCE", telemetry.obstacle_distance, 0.0, 10.0),
     Stream("UTM_GLOBAL_POSITION", telemetry.utm_global_position, 0.0, 0.0),
+    Stream("DISTANCE_SENSOR", telemetry_on_demand.distance_sensor, 0.5, 2.0),
+    Stream("ORBIT_EXECUTION_STATUS", telemetry_on_demand.orbit_execution_status, 1.0, 1.0),
+    Stream("SCALED_IMU", telemetry_on_demand.scaled_imu, 0.0, 0.0),
+    Stream("ACTUATOR_OUTPUT_STATUS", telemetry_on_demand.actuator_output_status, 0.0, 0.0),
+    Stream("FLIGHT_INFORMATION", telemetry_on_demand.flight_information, 0.0, 0.0),
+    Stream("HIL_STATE_QUATERNION", telemetry_on_demand.hil_state_quaternion, 0.0, 0.0),
+    Stream("PROTOCOL_VERSION", telemetry_on_demand.protocol_version, 0.0, 0.0),
+    Stream("COMPONENT_INFORMATION", telemetry_on_demand.component_information, 0.0, 0.0),
+    Stream("COMPONENT_METADATA", telemetry_on_demand.component_metadata, 0.0, 0.0),
 )
-BY_ID = {LAYOUTS[stream.name].message_id: stream for stream in STREAMS}
+_OWN_LAYOUTS = {
+    layout.name: layout
+    for layout in (
+        telemetry_on_demand.PROTOCOL_VERSION,
+        telemetry_on_demand.COMPONENT_INFORMATION,
+        telemetry_on_demand.COMPONENT_METADATA,
+    )
+}
+LAYOUT_OF = {stream.name: _OWN_LAYOUTS.get(stream.name) or LAYOUTS[stream.name] for stream in STREAMS}
+"""Message name -> layout, for all streams."""
+BY_ID = {LAYOUT_OF[stream.name].message_id: stream for stream in STREAMS}
 """Message id -> stream."""
+KEEP_THEIR_RATE = {"HEARTBEAT", "PROTOCOL_VERSION", "COMPONENT_INFORMATION", "COMPONENT_METADATA"}
+"""Streams whose rate nobody can order; the last three come once, when they are asked for."""
 
 _ABSENT = """
-    ACTUATOR_OUTPUT_STATUS ADSB_VEHICLE ATT_POS_MOCAP AUTOPILOT_STATE_FOR_GIMBAL_DEVICE CAMERA_IMAGE_CAPTURED
-    CAMERA_TRIGGER COLLISION DEBUG DEBUG_FLOAT_ARRAY DEBUG_VECT DISTANCE_SENSOR EFI_STATUS FLIGHT_INFORMATION
-    GENERATOR_STATUS GIMBAL_DEVICE_ATTITUDE_STATUS GIMBAL_DEVICE_SET_ATTITUDE GIMBAL_MANAGER_STATUS GPS2_RAW
-    GPS_RTCM_DATA GPS_STATUS HIGH_LATENCY2 HIL_ACTUATOR_CONTROLS HIL_STATE_QUATERNION MANUAL_CONTROL MOUNT_ORIENTATION
-    NAMED_VALUE_FLOAT NAV_CONTROLLER_OUTPUT OPEN_DRONE_ID_BASIC_ID OPEN_DRONE_ID_LOCATION OPEN_DRONE_ID_SYSTEM
-    OPTICAL_FLOW_RAD ORBIT_EXECUTION_STATUS RAW_RPM RC_CHANNELS SCALED_IMU SCALED_IMU2 SCALED_IMU3 SCALED_PRESSURE2
-    SCALED_PRESSURE3 SMART_BATTERY_INFO STORAGE_INFORMATION WIND_COV
+    ADSB_VEHICLE AUTOPILOT_STATE_FOR_GIMBAL_DEVICE AVAILABLE_MODES CAMERA_IMAGE_CAPTURED CAMERA_TRIGGER COMMAND_LONG
+    DEBUG DEBUG_FLOAT_ARRAY DEBUG_VECT EFI_STATUS GIMBAL_DEVICE_ATTITUDE_STATUS GIMBAL_DEVICE_INFORMATION
+    GIMBAL_DEVICE_SET_ATTITUDE GIMBAL_MANAGER_INFORMATION GIMBAL_MANAGER_STATUS GPS2_RAW GPS_RTCM_DATA GPS_STATUS
+    HIGH_LATENCY2 HIL_ACTUATOR_CONTROLS HYGROMETER_SENSOR LANDING_TARGET MAG_CAL_REPORT MANUAL_CONTROL
+    MOUNT_ORIENTATION NAMED_VALUE_FLOAT NAV_CONTROLLER_OUTPUT OPEN_DRONE_ID_ARM_STATUS OPEN_DRONE_ID_BASIC_ID
+    OPEN_DRONE_ID_LOCATION OPEN_DRONE_ID_SYSTEM OPTICAL_FLOW_RAD RAW_RPM RC_CHANNELS SCALED_IMU2 SCALED_IMU3
+    SCALED_PRESSURE2 SCALED_PRESSURE3 STATUSTEXT STORAGE_INFORMATION TRAJECTORY_REPRESENTATION_WAYPOINTS WIND_COV
 """
-WITHOUT_DATA = frozenset(LAYOUTS[name].message_id for name in _ABSENT.split())
+_LINK_NODE_STATUS, _TIME_ESTIMATE_TO_TARGET = 8, 380
+WITHOUT_DATA = frozenset(LAYOUTS[name].message_id for name in _ABSENT.split()) | {
+    _LINK_NODE_STATUS,
+    _TIME_ESTIMATE_TO_TARGET,
+}
 """Messages that a PX4 streams when told to, and that nothing here makes: the order is taken, and nothing comes."""
 
 
@@ -88,7 +113,7 @@ class Streams:
         self._link = link
         self._send = outbox.sender_of_values(link)
         self._tick_s = tick_s
-        self._schedules = {stream.name: _Schedule(LAYOUTS[stream.name], stream.build) for stream in STREAMS}
+        self._schedules = {stream.name: _Schedule(LAYOUT_OF[stream.name], stream.build) for stream in STREAMS}
         self._due: list[tuple[float, str]] = []
         """When each stream that is on is due, as a heap."""
         for phase, stream in enumerate(STREAMS):
@@ -108,17 +133,18 @@ class Streams:
             if values is not None:
                 self._send(schedule.layout, values)
 
-    def send_now(self, name: str, moment: Moment) -> None:
-        """Send one message out of turn."""
+    def send_now(self, name: str, moment: Moment) -> bool:
+        """Send one message out of turn; returns whether there was anything to say."""
         schedule = self._schedules[name]
         values = schedule.build(moment)
         if values is not None:
             self._send(schedule.layout, values)
+        return values is not None
 
     def set_interval(self, message_id: int, interval_us: float, now_s: float) -> bool:
         """SET_MESSAGE_INTERVAL: -1 is off, 0 the default; False for a message that a PX4 cannot stream."""
         stream = BY_ID.get(message_id)
-        if stream is None:
+        if stream is None or stream.name in KEEP_THEIR_RATE:
             return message_id in WITHOUT_DATA
         interval_s = self._default_s(stream) if interval_us == 0.0 else interval_us * 1e-6
         self._set(stream.name, interval_s, now_s)

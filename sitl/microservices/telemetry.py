@@ -8,6 +8,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from missions.mission import Positioning
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.modes import SAFETY_ARMED, Mode
@@ -26,6 +28,8 @@ PREARM_BIT = 0x10000000
 MISSION_NONE = 65535
 NEAREST_CM = 10
 """OBSTACLE_DISTANCE's min_distance."""
+PWM_OFF = 900
+"""Of an output that drives nothing, or a motor that is disarmed."""
 UTM_AVAILABLE = 0b0111_1111
 """UTM_DATA_AVAIL_FLAGS: everything but the next waypoint."""
 
@@ -51,6 +55,8 @@ class Moment(NamedTuple):
     """UTC of now: the simulation's start plus simulated time."""
     positioning: Positioning
     sysid: int
+    body: np.void
+    """The vehicle's record in the fleet, the truth included."""
     surroundings: Surroundings | None = None
     """None without a range sensor."""
 
@@ -132,13 +138,13 @@ def home_position(m: Moment) -> tuple | None:
     place = craft.frame.on_earth(craft.home)
     half_yaw = 0.5 * craft.home_yaw_rad
     q = (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
-    here = _e7(place.latitude_deg), _e7(place.longitude_deg), round(place.altitude_m * 1e3)
+    here = e7(place.latitude_deg), e7(place.longitude_deg), round(place.altitude_m * 1e3)
     return *here, *craft.home, q, 0.0, 0.0, 0.0, round(craft.home_set_s * 1e6)
 
 
 def gps_global_origin(m: Moment) -> tuple:
     origin = m.autopilot.craft.frame.origin
-    return _e7(origin.latitude_deg), _e7(origin.longitude_deg), round(origin.altitude_m * 1e3), m.time_us
+    return e7(origin.latitude_deg), e7(origin.longitude_deg), round(origin.altitude_m * 1e3), m.time_us
 
 
 def system_time(m: Moment) -> tuple:
@@ -208,7 +214,7 @@ def global_position_int(m: Moment) -> tuple | None:
     s = m.s
     if not m.autopilot.craft.position_valid:
         return None
-    place = _e7(s.latitude_deg), _e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
+    place = e7(s.latitude_deg), e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
     velocity = round(s.vx_m_s * 100.0), round(s.vy_m_s * 100.0), round(s.vz_m_s * 100.0)
     return m.time_boot_ms, *place, *velocity, round(_heading_deg(s.yaw_rad) * 100.0) % 36000
 
@@ -219,7 +225,7 @@ def gps_raw_int(m: Moment) -> tuple:
         return m.time_us, 1, 0, 0, 0, 65535, 65535, 65535, 65535, 0, 0, 0, 0, 0, 0, 0
     altitude_mm = round(s.altitude_m * 1e3)
     course = round(_heading_deg(math.atan2(s.vy_m_s, s.vx_m_s)) * 100.0) % 36000
-    place = _e7(s.latitude_deg), _e7(s.longitude_deg), altitude_mm
+    place = e7(s.latitude_deg), e7(s.longitude_deg), altitude_mm
     speed = round(s.ground_speed_m_s * 100.0)
     return m.time_us, 3, *place, 70, 110, speed, course, 10, altitude_mm, 900, 1780, 400, 0, 0
 
@@ -282,7 +288,7 @@ def utm_global_position(m: Moment) -> tuple:
     s = m.s
     across, up = (round(std * 1e3) for std in (m.positioning.horizontal_std_m, m.positioning.vertical_std_m))
     uas_id = (m.sysid,) + (0,) * 17
-    place = _e7(s.latitude_deg), _e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
+    place = e7(s.latitude_deg), e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
     velocity = round(s.vx_m_s * 100.0), round(s.vy_m_s * 100.0), round(s.vz_m_s * 100.0)
     accuracy = min(across, 65535), min(up, 65535), min(round(m.positioning.velocity_std_m_s * 100.0), 65535)
     state = mavlink.UTM_FLIGHT_STATE_AIRBORNE if not m.s.landed else mavlink.UTM_FLIGHT_STATE_GROUND
@@ -311,26 +317,28 @@ def position_target_global_int(m: Moment) -> tuple | None:
     if s.landed or autopilot.craft.control.guidance not in (Guidance.WAYPOINT, Guidance.LAND):
         return None
     place = autopilot.craft.frame.on_earth(LocalPoint(*autopilot.craft.control.target_m))
-    target = _e7(place.latitude_deg), _e7(place.longitude_deg), place.altitude_m
+    target = e7(place.latitude_deg), e7(place.longitude_deg), place.altitude_m
     heading = s.setpoint_yaw_rad, _finite(s.setpoint_yawspeed_rad_s)
     return m.time_boot_ms, 5, 0, *target, *_setpoint_velocity(s), *_setpoint_acceleration(s), *heading
 
 
 def servo_output_raw(m: Moment) -> tuple:
-    s = m.s
-    if m.autopilot.armed:
-        motors = tuple(round(1000.0 + 1000.0 * u) for u in (s.motor_1, s.motor_2, s.motor_3, s.motor_4))
-    else:
-        motors = (900,) * 4
-    time_us = m.time_us & 0xFFFFFFFF
-    return time_us, 0, *motors, *(900,) * 12
+    return m.time_us & 0xFFFFFFFF, 0, *motor_pwm(m), *(PWM_OFF,) * 12
+
+
+def motor_pwm(m: Moment) -> tuple[int, int, int, int]:
+    """The signals to the motors, in microseconds."""
+    if not m.autopilot.armed:
+        return PWM_OFF, PWM_OFF, PWM_OFF, PWM_OFF
+    u1, u2, u3, u4 = (round(1000.0 + 1000.0 * u) for u in (m.s.motor_1, m.s.motor_2, m.s.motor_3, m.s.motor_4))
+    return u1, u2, u3, u4
 
 
 # --------------------------------------------------------------- details
 _NANS_3, _NANS_4, _NANS_5, _NANS_9 = (NAN,) * 3, (NAN,) * 4, (NAN,) * 5, (NAN,) * 9
 
 
-def _e7(degrees: float) -> int:
+def e7(degrees: float) -> int:
     return round(degrees * 1e7)
 
 

@@ -103,9 +103,9 @@ def ray_grid(sensor: RangeSensor, turn: Array) -> Array:
     columns, rows = (math.ceil(angle / math.radians(sensor.spacing_deg)) for angle in (horizontal, vertical))
     azimuth = horizontal * ((np.arange(columns) + turn[0]) / columns - 0.5)
     elevation = vertical * ((np.arange(rows) + turn[1]) / rows - 0.5)
-    level, rays = np.cos(elevation), np.empty((rows, columns, 3))
-    rays[..., 0], rays[..., 1] = np.outer(level, np.cos(azimuth)), np.outer(level, np.sin(azimuth))
-    rays[..., 2] = np.sin(elevation)[:, None]
+    level, ahead = np.cos(elevation)[:, None], np.stack([np.cos(azimuth), np.sin(azimuth)])
+    rays = np.empty((rows, columns, 3))
+    rays[..., 0], rays[..., 1], rays[..., 2] = level * ahead[0], level * ahead[1], np.sin(elevation)[:, None]
     return rays.reshape(-1, 3)
 
 
@@ -117,12 +117,16 @@ def seen_sectors(sensor: RangeSensor) -> npt.NDArray[np.bool_]:
 
 
 def flu_to_enu(vectors_flu: Array, attitude_ned_frd: Array) -> Array:
-    """(n, 3) vectors of the sensor's frame in ENU, by the quaternion w, x, y, z of the body."""
+    """(n, 3) vectors of the sensor's frame in ENU, by the unit quaternion w, x, y, z of the body."""
     w, x, y, z = attitude_ned_frd.tolist()
-    forward = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
-    right = 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
-    down = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
-    return vectors_flu @ swap_enu_ned(np.array([forward, right, down]) * np.array([[1.0], [-1.0], [-1.0]]))
+    forward = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)  # in NED
+    left = 2.0 * (w * z - x * y), 2.0 * (x * x + z * z) - 1.0, -2.0 * (y * z + w * x)
+    up = -2.0 * (x * z + w * y), 2.0 * (w * x - y * z), 2.0 * (x * x + y * y) - 1.0
+    ned = [
+        f * vectors_flu[:, 0] + r * vectors_flu[:, 1] + u * vectors_flu[:, 2]
+        for f, r, u in zip(forward, left, up, strict=True)
+    ]
+    return swap_enu_ned(np.column_stack(ned))
 
 
 class PacketStream:

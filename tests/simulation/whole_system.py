@@ -51,6 +51,10 @@ PLANNING_TIME_S = 0.01
 """A companion's plan takes so long in vehicle time; it is made at once, so that no run depends on the machine."""
 
 
+CLOUD_PLANNING_TIME_S = 0.2
+"""Likewise a plan of the cloud's."""
+
+
 class Died(BaseException):
     """A fault has ended a companion; no `except Exception` of the companion's may catch it."""
 
@@ -94,8 +98,11 @@ class GroundWire:
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
+        self.bytes = 0
+        """Sent and received by the station."""
 
     def send(self, datagram: bytes, address: tuple[str, int]) -> None:
+        self.bytes += len(datagram)
         self._simulator.receive(address[1], Link.GROUND, datagram)
 
 
@@ -108,6 +115,7 @@ class WholeSystem:
         mode: who plans.
         seed: of planner and simulator.
         sensor: what the companions see with.
+        truth_mission: what the simulator has of the world; the mission, unless that is wrong about it.
     """
 
     mission: Mission
@@ -118,10 +126,11 @@ class WholeSystem:
 
     faults: tuple[Fault, ...] = ()
     sensor: SensorKind = SensorKind.LIDAR
+    truth_mission: Mission | None = None
 
     def __post_init__(self) -> None:
         looking = self.mode.needs_companions and self.sensor is not SensorKind.NONE
-        self.simulator = Simulator(self.mission, seed=self.seed, lidar=looking)
+        self.simulator = Simulator(self.truth_mission or self.mission, seed=self.seed, lidar=looking)
         self.lidars = {vehicle.sysid: LidarWire() for vehicle in self.mission.vehicles}
         self.station = Station(unix_us=lambda: 0)
         self.wire = GroundWire(self.simulator)
@@ -168,7 +177,9 @@ class WholeSystem:
         }
 
     async def _plan(self, mission: Mission) -> FleetPlan:
-        return planned(msgspec.json.encode(mission), self.seed)
+        plan = planned(msgspec.json.encode(mission), self.seed)
+        await asyncio.sleep(CLOUD_PLANNING_TIME_S)
+        return plan
 
     async def _companion(self, vehicle: Vehicle) -> None:
         """One companion, until it is cancelled or a fault ends it."""
@@ -209,6 +220,7 @@ class WholeSystem:
             self.truth.append((truth.time_s, truth.position_enu_m, truth.velocity_enu_m_s))
             for sysid, link, frame in self.simulator.transmissions():
                 if link is Link.GROUND:
+                    self.wire.bytes += len(frame)
                     self.station.receive(self.wire, frame, ("simulator", sysid))
                 elif sysid in self.autopilots:
                     self.autopilots[sysid].receive_frame(frame)

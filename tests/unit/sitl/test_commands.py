@@ -1,15 +1,18 @@
 """Every command has PX4's answer, whoever asks, and a repeated copy has no second effect."""
 
 import math
+import struct
 
 import numpy as np
 import pytest
 
+from missions.mission import Positioning
 from sitl.dialect import mavlink
 from sitl.microservices.outbox import Link
-from tests.unit.sitl.flown import NAN, Flown, place, waypoint
+from tests.unit.sitl.flown import NAN, Flown, field, place, waypoint
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
+CANCELLED = 6
 
 ON_THE_GROUND = [
     *[(number, (), UNSUPPORTED) for number in (16, 17, 92, 115, 183, 193, 207, 208, 224, 2000, 31000, 40000, 65000)],
@@ -21,6 +24,16 @@ ON_THE_GROUND = [
     (195, (0, 0, 0, 0, NAN, NAN, 500.0), DENIED),
     (197, (), ACCEPTED),
     (178, (1, 3), ACCEPTED),
+    (186, (500.0,), ACCEPTED),
+    (189, (), CANCELLED),
+    (191, (), ACCEPTED),
+    (201, (3, 0, 0, 0, 47.4, 8.5, 500.0), ACCEPTED),
+    (201, (0,), ACCEPTED),
+    (201, (4, 1), UNSUPPORTED),
+    *[(245, (number,), ACCEPTED) for number in range(5)],
+    (245, (9,), DENIED),
+    (519, (1,), ACCEPTED),
+    (528, (1,), ACCEPTED),
     (178, (1, -5), ACCEPTED),
     (179, (1,), ACCEPTED),
     (179, (0, 0, 0, 0, 47.4, 8.5, 480.0), ACCEPTED),
@@ -43,7 +56,11 @@ ON_THE_GROUND = [
     (511, (30, NAN), DENIED),
     (511, (132, 20000), ACCEPTED),
     (511, (246, 20000), ACCEPTED),
-    (512, (148,), ACCEPTED),
+    (511, (0, 20000), FAILED),
+    *[(512, (number,), ACCEPTED) for number in (0, 26, 115, 132, 148, 242, 264, 300, 331, 375, 395, 397, 436)],
+    (512, (87,), DENIED),
+    (512, (330,), DENIED),
+    (512, (360,), DENIED),
     (512, (42,), DENIED),
     (512, (259,), DENIED),
     (512, (340,), DENIED),
@@ -270,10 +287,10 @@ def test_the_same_order_given_again_is_a_new_order():
 
 def test_messages_for_absent_equipment_can_be_ordered_and_do_not_come():
     flown = Flown().boot()
-    flown.command(511, 132, 20000)
+    flown.command(511, 246, 20000)
     flown.run(0.5)
-    assert not flown.messages("DISTANCE_SENSOR")
-    flown.command(510, 132)
+    assert not flown.messages("ADSB_VEHICLE")
+    flown.command(510, 246)
     assert flown.last("MESSAGE_INTERVAL").interval_us == 0
 
 
@@ -302,3 +319,70 @@ def test_there_are_no_logs_and_one_entry_says_so():
     flown = Flown().boot()
     flown.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
     assert [entry.num_logs for entry in flown.messages("LOG_ENTRY")] == [0]
+
+
+def test_the_protocol_version_comes_when_it_is_asked_for():
+    flown = Flown().boot()
+    assert flown.command(519, 1) == ACCEPTED
+    (frame,) = [frame for frame in flown.heard(Link.GROUND) if frame[7:10] == (300).to_bytes(3, "little")]
+    assert struct.unpack("<HHH", frame[10:-2].ljust(6, b"\0")) == (200, 100, 200)
+    assert mavlink.x25crc(frame[1:-2] + b"\xd9").crc == int.from_bytes(frame[-2:], "little")
+
+
+def test_component_metadata_names_no_files():
+    flown = Flown().boot()
+    for number in (395, 397):
+        assert flown.command(512, number) == ACCEPTED
+        (frame,) = [frame for frame in flown.heard(Link.GROUND) if frame[7:10] == number.to_bytes(3, "little")]
+        assert len(frame) <= 10 + 4 + 2, "nothing but the time since boot"
+
+
+def test_the_range_finder_looks_down():
+    flown = Flown().take_off(6.0).run(4.0)
+    sensor = flown.last("DISTANCE_SENSOR")
+    assert sensor.orientation == 25
+    assert sensor.current_distance == pytest.approx(100.0 * flown.position[2], abs=5)
+
+
+def test_the_ground_truth_is_given_away_on_request():
+    gnss = Positioning(horizontal_std_m=1.0, vertical_std_m=1.0, velocity_std_m_s=0.2)
+    flown = Flown(field(positioning=gnss)).take_off(6.0).run(2.0)
+    flown.command(511, 115, 20000)
+    flown.run(0.1)
+    truth = flown.last("HIL_STATE_QUATERNION")
+    enu = flown.simulator.mission.frame.enu(truth.lat * 1e-7, truth.lon * 1e-7, truth.alt * 1e-3)
+    np.testing.assert_allclose(enu, flown.position, atol=0.05)
+
+
+def test_an_orbit_says_around_what():
+    flown = Flown().take_off(6.0)
+    latitude_e7, longitude_e7 = place(10.0, 20.0)
+    flown.command(34, -12, 3, 0, NAN, latitude_e7 * 1e-7, longitude_e7 * 1e-7, 496.0)
+    flown.run(3.0)
+    status = flown.last("ORBIT_EXECUTION_STATUS")
+    assert status.radius == -12.0
+    np.testing.assert_allclose((status.x, status.y), (latitude_e7, longitude_e7), atol=10)
+
+
+def test_flight_information_knows_when_this_flight_began():
+    flown = Flown().take_off(6.0)
+    assert flown.command(528, 1) == ACCEPTED
+    flight, utc_us = flown.last("FLIGHT_INFORMATION"), flown.last("SYSTEM_TIME").time_unix_usec
+    assert utc_us - 60e6 < flight.arming_time_utc < flight.takeoff_time_utc < utc_us
+    assert flight.flight_uuid == 1
+
+
+def test_the_altitude_alone_can_be_changed():
+    flown = Flown().take_off(6.0)
+    assert flown.command(186, 489.4 + 9.0) == ACCEPTED
+    flown.run(8.0)
+    np.testing.assert_allclose(flown.position, [0.0, 0.0, 9.0], atol=0.3)
+
+
+def test_parameters_go_back_to_their_defaults_on_the_ground_alone():
+    flown = Flown().boot()
+    flown.simulator.vehicles[1].autopilot.parameters.set("MIS_TAKEOFF_ALT", 6.0)
+    assert flown.command(245, 2) == ACCEPTED
+    assert flown.simulator.vehicles[1].autopilot.parameters["MIS_TAKEOFF_ALT"] == 2.5
+    assert flown.simulator.memories[1].parameters == {}
+    assert flown.take_off(6.0).command(245, 2) == TEMPORARILY_REJECTED

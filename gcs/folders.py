@@ -1,0 +1,21 @@
+"""Where the ground station keeps what outlasts a flight: keys, and recordings (the XDG base directories)."""
+
+import os
+from pathlib import Path
+
+NAME = "end-cloud-gcs"
+
+
+def key_folder(ring: str) -> Path:
+    """Of one ring of signing keys: `vehicles` for real ones, `sim` for those of the bundled simulator."""
+    return _base("XDG_CONFIG_HOME", ".config") / NAME / "keys" / ring
+
+
+def flights_folder() -> Path:
+    """Of the flights that were given no `--report`."""
+    return _base("XDG_STATE_HOME", ".local/state") / NAME / "flights"
+
+
+def _base(variable: str, otherwise: str) -> Path:
+    named = os.environ.get(variable, "")
+    return Path(named) if os.path.isabs(named) else Path.home() / otherwise

@@ -1,0 +1,1 @@
+"""Experiments that fly the whole system in process."""

@@ -1,0 +1,118 @@
+"""Worlds in which the map is right, lacks an obstacle, has it elsewhere, or hides a dead end."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import msgspec
+import numpy as np
+
+from gcs.planner import plan_mission
+from missions import obstacles
+from missions.mission import Blackout, LinkSettings, Mission, contradictions, load_mission
+from missions.world import Box, Cylinder
+
+PILLAR_RADIUS_M = 0.5
+ROOM_AROUND_M = 1.4
+"""An unmapped pillar leaves this much room to everything that is mapped, where the way does: there is a way past it."""
+JITTER_M = 0.8
+POCKET_DEPTH_M = (2.5, 3.5)
+POCKET_WIDTH_M = (5.0, 7.0)
+WALL_HALF_M = 0.15
+
+
+class World(Enum):
+    """How the world differs from its map."""
+
+    AS_MAPPED = "map right"
+    MISSING = "obstacle missing from the map"
+    MOVED = "obstacle moved"
+    DEAD_END = "dead end"
+
+
+class Link(Enum):
+    """The ground link."""
+
+    GOOD = "good"
+    BAD = "300 ms, 10 % loss"
+    BLACKOUT = "blackout"
+
+
+LINKS = {
+    Link.GOOD: LinkSettings(),
+    Link.BAD: LinkSettings(delay_s=0.3, loss=0.1),
+    Link.BLACKOUT: LinkSettings(blackouts=(Blackout(from_s=5.0, duration_s=30.0),)),
+}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One flight's mission, as everybody is told, and the truth about it."""
+
+    mission: Mission
+    truth: Mission
+
+
+def scenario(world: World, link: Link, seed: int) -> Scenario:
+    """The scenario of a seed: the same world for every mode and link."""
+    rng = np.random.default_rng([seed, list(World).index(world)])
+    mission = _jittered(load_mission("indoor"), rng)
+    truth = mission
+    match world:
+        case World.MISSING:
+            truth = _with(mission, cylinders=(*mission.world.cylinders, _in_the_way(mission, rng)))
+        case World.MOVED:
+            truth = _with(mission, cylinders=(_in_the_way(_with(mission, cylinders=()), rng),))
+        case World.DEAD_END:
+            mission = _with(mission, boxes=(), cylinders=())
+            truth = _with(mission, boxes=_pocket(rng))
+    ground_link = LINKS[link]
+    return Scenario(_linked(mission, ground_link), _linked(truth, ground_link))
+
+
+def _jittered(mission: Mission, rng: np.random.Generator) -> Mission:
+    """The paper's room with its two obstacles somewhat elsewhere."""
+    while True:
+        (crate,), (column,) = mission.world.boxes, mission.world.cylinders
+        shift_m = rng.uniform(-JITTER_M, JITTER_M, (2, 2))
+        east_m, north_m = np.array(crate.centre_m[:2]) + shift_m[0]
+        crate = msgspec.structs.replace(crate, centre_m=(float(east_m), float(north_m), crate.centre_m[2]))
+        east_m, north_m = np.array(column.centre_m) + shift_m[1]
+        column = msgspec.structs.replace(column, centre_m=(float(east_m), float(north_m)))
+        moved = _with(mission, boxes=(crate,), cylinders=(column,))
+        if not list(contradictions(moved)):
+            return moved
+
+
+def _in_the_way(mission: Mission, rng: np.random.Generator) -> Cylinder:
+    """A pillar on the curve that the cloud plans for one of the vehicles, clear of everything that is mapped."""
+    plan, solid = plan_mission(mission, seed=0), obstacles.pack(mission.world)
+    curve_m = plan.vehicles[int(rng.integers(len(plan.vehicles)))].curve_m
+    places_m = curve_m[int(0.3 * len(curve_m)) : int(0.75 * len(curve_m))]
+    free_m = obstacles.clearance(places_m, solid)
+    roomy = np.flatnonzero(free_m >= PILLAR_RADIUS_M + ROOM_AROUND_M)
+    return _pillar(places_m[rng.choice(roomy)] if len(roomy) else places_m[int(np.argmax(free_m))])
+
+
+def _pillar(place_m: np.ndarray) -> Cylinder:
+    middle_m = (float(place_m[0]), float(place_m[1]))
+    return Cylinder(name="pillar", centre_m=middle_m, radius_m=PILLAR_RADIUS_M, top_m=4.0)
+
+
+def _pocket(rng: np.random.Generator) -> tuple[Box, ...]:
+    """Three walls that are open to the side from which the vehicles come, from floor to ceiling."""
+    depth_m, width_m = rng.uniform(*POCKET_DEPTH_M), rng.uniform(*POCKET_WIDTH_M)
+    back_m, middle_m = rng.uniform(11.0, 13.0), rng.uniform(7.0, 8.0)
+    half = WALL_HALF_M
+    sides = [(back_m - 0.5 * depth_m, middle_m + side * 0.5 * width_m) for side in (-1.0, 1.0)]
+    walls = [((back_m, middle_m, 2.0), (half, 0.5 * width_m + half, 2.0))]
+    walls += [((east_m, north_m, 2.0), (0.5 * depth_m, half, 2.0)) for east_m, north_m in sides]
+    return tuple(Box(name=f"wall {n}", centre_m=c, half_m=h) for n, (c, h) in enumerate(walls))
+
+
+def _with(mission: Mission, **parts: tuple) -> Mission:
+    return msgspec.structs.replace(mission, world=msgspec.structs.replace(mission.world, **parts))
+
+
+def _linked(mission: Mission, ground_link: LinkSettings) -> Mission:
+    simulation = msgspec.structs.replace(mission.simulation, ground_link=ground_link)
+    return msgspec.structs.replace(mission, simulation=simulation)
