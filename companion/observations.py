@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from missions import obstacles
-from missions.mission import Mission
 from missions.occupancy import (
     BLOCK_VOXELS,
     BlockIndex,
@@ -48,17 +46,13 @@ class Observations:
     """One vehicle's report of what it has seen.
 
     Args:
-        mission: explains what was mapped before: the known world, the ground, the edge of the flight range.
+        map_voxel_m: edge of a voxel of the map, which holds what the mission does not explain [m].
         budget_bytes_s: of the link, for these reports [bytes/s of vehicle time].
     """
 
-    def __init__(self, mission: Mission, budget_bytes_s: float) -> None:
-        self.voxel_m = COARSENING * mission.onboard.voxel_m
+    def __init__(self, map_voxel_m: float, budget_bytes_s: float) -> None:
+        self.voxel_m = COARSENING * map_voxel_m
         self.budget_bytes_s = budget_bytes_s
-        self._known = obstacles.pack(mission.world.as_known(), with_threats=False)
-        self._bounds = mission.world.bounds
-        positioning = mission.simulation.positioning
-        self._margin_m = self.voxel_m + 2.0 * max(positioning.horizontal_std_m, positioning.vertical_std_m)
         self._blocks: dict[BlockIndex, _Block] = {}
         self._saved_bytes, self._saved_at_s = 0.0, -np.inf
 
@@ -72,7 +66,7 @@ class Observations:
             now_s: vehicle time.
         """
         edge_m = BLOCK_VOXELS * self.voxel_m
-        found = blocks_of(voxels_of(self._unexplained(occupied_enu_m), self.voxel_m))
+        found = blocks_of(voxels_of(occupied_enu_m, self.voxel_m))
         for index in found.keys() | self._blocks.keys():
             corner_m = np.array(index) * edge_m
             if np.all(corner_m < high_m) and np.all(corner_m + edge_m > low_m):
@@ -107,16 +101,6 @@ class Observations:
         self._saved_bytes += passed_s * self.budget_bytes_s
         self._saved_bytes = min(self._saved_bytes, max(BURST_S * self.budget_bytes_s, FRAME_BYTES))
         return self._saved_bytes
-
-    def _unexplained(self, points_m: Array) -> Array:
-        """Those of (n, 3) points that are neither the known world nor the ground nor outside of the flight range."""
-        if len(points_m) == 0:
-            return points_m
-        inside = np.all((points_m > self._bounds.low_enu_m) & (points_m < self._bounds.high_enu_m), axis=1)
-        ground_m = obstacles.terrain_height(points_m, self._known)
-        above = points_m[:, 2] - np.maximum(ground_m, self._bounds.low_enu_m[2]) > self._margin_m
-        points_m = points_m[inside & above]
-        return points_m[obstacles.clearance(points_m, self._known) > self._margin_m]
 
     def _change(self, index: BlockIndex, seen: BoolArray | None, low_m: Array, high_m: Array, now_s: float) -> None:
         """A block as the window shows it now: voxels with their middle outside of the window stay as they were."""

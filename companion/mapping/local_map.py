@@ -13,7 +13,7 @@ from companion.mapping.distance_field import (
     templates,
 )
 from companion.mapping.movers import Mover, MoverWatch
-from companion.mapping.occupancy import BLOCK, Grid, integrate, rebuild, vacate
+from companion.mapping.occupancy import BLOCK, HIT, Grid, integrate, rebuild, vacate
 from companion.mapping.sorting import CANDIDATE, NEAR_SELF, Known, sort_points
 from companion.sensing.scan import Scan
 
@@ -29,6 +29,8 @@ LEAST_REACH, LARGEST_REACH = 3, 10
 """Of the distance field, in nodes."""
 REBUILT_PER_SCAN = 8
 """Stale blocks that a scan takes out of the field."""
+CERTAIN = 2 * HIT
+"""A voxel of this strength was hit by more than one scan: noise and passers-by seldom are."""
 NEIGHBOUR_MARGIN_M = 0.25
 """What is seen this near to where a neighbour's body should be is the neighbour."""
 
@@ -95,6 +97,16 @@ class LocalMap:
         self._next_block = rebuild(grid, self._next_block, REBUILT_PER_SCAN)
         field = Field(grid.field.copy(), grid.low_m, VOXELS_PER_NODE * grid.voxel_m, grid.step_m)
         self.view = View(field, self._watch.movers)
+
+    def certain(self) -> tuple[Array, Array, Array]:
+        """What is occupied for certain: (n, 3) centres of voxels, ENU [m], and the window's two corners.
+
+        Ask it in the thread that observes.
+        """
+        grid = self._grid
+        voxels = np.argwhere(grid.strength >= CERTAIN)
+        centres_m = grid.low_m + (voxels + 0.5) * grid.voxel_m
+        return centres_m, grid.low_m, grid.low_m + self._size * grid.voxel_m
 
     def _recentre(self, sensor_m: Array) -> None:
         """Move the window, in whole blocks, so that the vehicle is not near its edge."""

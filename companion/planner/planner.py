@@ -144,6 +144,10 @@ class Planner:
         """What the map holds now; never changed."""
         return self._map.view
 
+    def certain(self) -> tuple[Array, Array, Array]:
+        """What has been seen for certain, to be told to others; see `LocalMap.certain`."""
+        return self._map.certain()
+
     def plan(self, request: PlanRequest) -> Plan:
         """Plan along the request's guide, which is first led around what blocks it."""
         around = self._around(request.start.position_m, request.start_s, request.neighbours)

@@ -1,13 +1,10 @@
 """What was seen and is on no map goes to the ground, within a budget."""
 
 import numpy as np
-import pytest
 
 from companion.observations import FRAME_BYTES, MOST_BLOCKS, REPEAT_S, Observations
-from missions.mission import load_mission
 from missions.occupancy import decode_block
 
-INDOOR = load_mission("indoor")
 LOW_M, HIGH_M = np.array([4.0, 0.0, 0.0]), np.array([14.0, 10.0, 4.0])
 HERE_M = np.array([9.0, 3.0, 1.5])
 BUDGET_BYTES_S = 4000.0
@@ -21,7 +18,7 @@ def post(east_m: float = 10.0, north_m: float = 4.0) -> np.ndarray:
 
 
 def observations(budget_bytes_s: float = BUDGET_BYTES_S) -> Observations:
-    return Observations(INDOOR, budget_bytes_s)
+    return Observations(0.1, budget_bytes_s)
 
 
 def told(reporter: Observations, now_s: float) -> np.ndarray:
@@ -37,14 +34,6 @@ def test_a_post_on_no_map_is_reported_where_it_stands():
     points_m = told(reporter, 10.0)
     assert np.hypot(*(points_m[:, :2] - [10.0, 4.0]).T).max() <= 0.6
     assert np.ptp(points_m[:, 2]) >= 3.0
-
-
-@pytest.mark.parametrize("place_m", [[7.0, 5.45, 2.0], [13.0, 6.95, 1.0], [10.0, 3.0, 0.05]])
-def test_what_the_mission_explains_is_not_reported(place_m: list[float]):
-    """The face of the crate, the side of the column, the floor."""
-    reporter = observations()
-    reporter.update(np.array([place_m]), LOW_M, HIGH_M, 10.0)
-    assert reporter.due(HERE_M, 10.0) == []
 
 
 def test_what_has_not_changed_is_repeated_but_not_at_once():
@@ -103,7 +92,7 @@ def test_a_loss_is_made_good_by_repetition():
 
 
 def test_memory_is_bounded():
-    reporter = Observations(load_mission("terrain-1-5uav"), BUDGET_BYTES_S)
+    reporter = Observations(1.0, BUDGET_BYTES_S)
     rng = np.random.default_rng(0)
     low_m, high_m = np.zeros(3), np.array([2000.0, 2000.0, 900.0])
     reporter.update(rng.uniform((10, 10, 500), (1990, 1990, 890), (4 * MOST_BLOCKS, 3)), low_m, high_m, 1.0)

@@ -133,3 +133,14 @@ def test_a_view_that_was_taken_never_changes():
     settle(map_, wall(4.05), 3, 1.0)
     np.testing.assert_array_equal(view.field.values, before)
     assert map_.view is not view
+
+
+def test_what_is_told_to_others_was_hit_by_more_than_one_scan_and_is_on_no_map():
+    map_ = new_map()
+    map_.observe(scan([[5.05, 4.05, 1.55], [9.5, 6.0, 1.0]]), NOBODY)
+    assert len(map_.certain()[0]) == 0
+    map_.observe(scan([[5.05, 4.05, 1.55], [9.5, 6.0, 1.0]], 0.1), NOBODY)
+    places_m, low_m, high_m = map_.certain()
+    np.testing.assert_allclose(places_m, [[5.05, 4.05, 1.55]], atol=1e-9)
+    assert np.all(low_m < 0.0)
+    assert np.all(high_m > [12.0, 8.0, 4.0])
