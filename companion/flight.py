@@ -23,6 +23,8 @@ Array = npt.NDArray[np.float64]
 NEARLY_DONE_S = 2.0
 """A trajectory that reaches its target so soon is not replanned for its age."""
 PROGRESS_INTERVAL_S = 0.1
+WAITING_RESERVE_S = 0.25
+"""Who is blocked ahead brakes so much earlier than at the last moment: what is seen from nearby is larger."""
 BLIND = {Reason.NO_POSITION, Reason.NO_SENSOR}
 """Whoever does not know where it is, or what is around, makes no plans."""
 
@@ -167,9 +169,11 @@ class Flight:
     def _wants_plan(self, now_s: float) -> bool:
         if self._asked is not None or now_s < self._retry_at_s or self.holding is Reason.STOPPED_BY_OPERATOR:
             return False
+        latest = self.course.latest
+        if now_s < latest.start_s:
+            return False  # the last one is not even being flown
         if self._new_order is not None or self._blocked or self.holding is not Reason.NONE:
             return True
-        latest = self.course.latest
         if self.course.reaches_end and now_s > latest.end_s - NEARLY_DONE_S:
             return False
         return now_s - latest.start_s >= self._crew.settings.replan_age_s
@@ -199,7 +203,7 @@ class Flight:
             return Reason.NO_POSITION
         if sensor_silent:
             return Reason.NO_SENSOR
-        if not self._crew.planner.is_clear(self.course.trajectory(now_s), now_s):
+        if not self._crew.planner.is_clear(self.course.latest, now_s):
             return Reason.NO_PATH
         ended = self.is_at_rest(now_s) and not self.course.reaches_end
         return Reason.NO_PATH if ended else Reason.NONE
@@ -212,10 +216,10 @@ class Flight:
         self._blocked = blocked
 
     def _can_wait(self, trouble: Reason, now_s: float) -> bool:
-        """Whether a new plan can be waited for: one could still stop on the way when it does not come."""
+        """Whether a new plan can be waited for: one could still stop in time when it does not come."""
         if trouble is not Reason.NO_PATH or self.is_at_rest(now_s):
             return False
-        planner, later_s = self._crew.planner, now_s + self._crew.allowance_s
+        planner, later_s = self._crew.planner, now_s + self._crew.allowance_s + WAITING_RESERVE_S
         return planner.is_clear(planner.brake(self.course.trajectory(later_s), later_s), later_s)
 
     def _announce_progress(self) -> Iterator[Instruction]:
