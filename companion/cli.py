@@ -29,6 +29,7 @@ from missions.errors import MissionError
 from missions.faults import EXAMPLES, Fault, parse_fault
 from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
+from missions.lean_numba import give_back_the_compiler, leave_out_what_no_kernel_needs
 from missions.lidar_packets import FIRST_PORT
 from missions.mission import Mission, SensorKind, load_mission
 from missions.ports import companion_port
@@ -97,6 +98,7 @@ def companion(
 
 def main() -> None:
     """Entry point of the console script."""
+    leave_out_what_no_kernel_needs()
     app()
 
 
@@ -117,6 +119,7 @@ async def _fly(
     journal.tell("preparing the planner (a fresh machine compiles it once, which takes half a minute)")
     with one_at_a_time("companion"):
         warm_up(planner, mission, vehicle)
+    give_back_the_compiler()
     with ExitStack() as open_ports, ThreadPoolExecutor(1, thread_name_prefix="planner") as threads:
         sensing = None if driver is None else _sensing(driver, settings, mission, open_ports)
         loop = asyncio.get_running_loop()
