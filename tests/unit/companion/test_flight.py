@@ -108,56 +108,55 @@ def test_a_trajectory_that_is_blocked_is_braked_on_at_once():
 
 
 class SeesAhead(StraightPlanner):
-    """Something far ahead blocks what is flown; stopping is possible until `stop_by_s`."""
+    """What is flown turns out to be blocked from `conflict_at_s` on."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.blocked_from: Trajectory | None = None
-        self.stop_by_s = np.inf
+        self.blocked: Trajectory | None = None
+        self.conflict_at_s = np.inf
 
-    def is_clear(self, trajectory: Trajectory, now_s: float) -> bool:
-        stops = trajectory.duration_s < 2.0
-        return trajectory is not self.blocked_from and (not stops or now_s < self.stop_by_s)
+    def conflict_s(self, trajectory: Trajectory, now_s: float) -> float:
+        return self.conflict_at_s if trajectory is self.blocked else np.inf
 
 
-def blocked_ahead(planner: SeesAhead) -> Rig:
+def blocked_ahead(in_s: float) -> Rig:
     """A second and a half on its way, a vehicle whose trajectory turns out to be blocked; it gets no answers."""
+    planner = SeesAhead()
     rig = Rig(planner=planner).flying()
     rig.run(1.5)
     assert rig.pilot._flight is not None
-    rig.answers_plans, planner.blocked_from = False, rig.pilot._flight.course.latest
+    rig.answers_plans, planner.blocked = False, rig.pilot._flight.course.latest
+    planner.conflict_at_s = rig.now_s + in_s
     return rig
 
 
 def test_blocked_ahead_it_plans_at_once_and_flies_on_while_it_could_still_stop():
-    rig = blocked_ahead(SeesAhead())
+    rig = blocked_ahead(in_s=2.5)
     happened = rig.run(0.3)
     (wanted,) = of(happened, instructions.RequestPlan)
     assert rig.pilot.state is State.FLYING
-    assert "blocked ahead" in [note.text for note in of(happened, instructions.Note)]
     rig.now_s -= 0.25
+    replans = rig.pilot.figures.replans
     rig.feed(rig.answer(wanted.request))
-    assert rig.pilot.figures.replans > 0
+    assert rig.pilot.figures.replans == replans + 1
     assert_smooth(happened)
 
 
 def test_blocked_ahead_without_an_answer_it_brakes_before_it_is_too_late():
-    planner = SeesAhead()
-    rig = blocked_ahead(planner)
-    planner.stop_by_s = rig.now_s + 0.8
-    rig.run(0.3)
+    rig = blocked_ahead(in_s=2.5)
+    speed_m_s = np.linalg.norm(rig.velocity_ned_m_s)
+    stops_s = speed_m_s / rig.planner.limits.acceleration_m_s2
+    rig.run(2.5 - stops_s - 0.3)
     assert rig.pilot.state is State.FLYING
-    rig.run(0.4)
+    rig.run(0.3)
     assert (rig.pilot.state, rig.pilot.reason) == (State.HOLDING, Reason.NO_PATH)
     assert_smooth(rig.run(3.0))
 
 
 def test_a_plan_that_has_not_begun_yet_is_judged_itself_and_not_replaced():
-    planner = SeesAhead()
-    rig = blocked_ahead(planner)
+    rig = blocked_ahead(in_s=2.5)
     rig.answers_plans = True
-    happened = rig.run(0.2)
-    assert len(of(happened, instructions.RequestPlan)) == 1
+    assert len(of(rig.run(0.2), instructions.RequestPlan)) == 1
     assert rig.pilot.state is State.FLYING
 
 
