@@ -160,7 +160,8 @@ class App:
         """Show scans to the planner until there is none."""
         while (scan := self._unseen) is not None:
             self._unseen = None
-            await self.work(partial(self.planner.observe, scan))
+            others = self.fleet.exchange.neighbours(self._now_s) if self.fleet is not None else ()
+            await self.work(partial(self.planner.observe, scan, others))
         self._observing = False
 
     async def _wait_for_stop(self) -> None:
