@@ -147,6 +147,7 @@ class Air:
     """The connection between the station and all scripted vehicles."""
 
     peer: tuple[str, int] | None = None
+    budget_bytes_s: float | None = None
 
     def __init__(self) -> None:
         self.vehicles: list[ScriptedVehicle] = []
