@@ -130,12 +130,9 @@ class WholeSystem:
     """(time [s], positions (n, 3), velocities (n, 3)) of every tick."""
 
     faults: tuple[Fault, ...] = ()
-<<<<<<< HEAD
     operate: Callable[[FleetFlight], Awaitable[None]] = FleetFlight.fly
     """Who lets it fly, from the connection to the end."""
-=======
     sensor: SensorKind = SensorKind.LIDAR
->>>>>>> hub/main
     truth_mission: Mission | None = None
 
     def __post_init__(self) -> None:
