@@ -22,7 +22,7 @@ from companion.link.px4 import Px4
 from companion.link.sensor_port import SensorPort, parse_address
 from companion.pilot import Pilot
 from companion.planner.planner import Planner
-from companion.sensing.sensing import Driver, Sensing, driver_of
+from companion.sensing.sensing import Driver, Sensing, driver_of, ring_hz_of
 from companion.settings import CompanionSettings, PlanningMode
 from companion.warm_up import warm_up
 from missions.errors import MissionError
@@ -128,7 +128,7 @@ async def _fly(
             settings,
             Pilot(mission, settings, planner),
             planner,
-            Px4(settings.vehicle, settings.system_url, journal.tell, ring_hz=_ring_hz(settings, mission)),
+            Px4(settings.vehicle, settings.system_url, journal.tell, ring_hz=ring_hz_of(settings.sensor, mission)),
             work,
             KernelTimer(settings.deadman_s),
             FaultInjection(faults, settings.vehicle),
@@ -154,10 +154,6 @@ def _sensing(driver: Driver, settings: CompanionSettings, mission: Mission, open
         return Sensing(driver, rate_hz)
     port = open_ports.enter_context(SensorPort(*parse_address(settings.lidar_address)))
     return Sensing(driver, rate_hz, port.poll)
-
-
-def _ring_hz(settings: CompanionSettings, mission: Mission) -> float:
-    return mission.sensor.rate_hz if settings.sensor is SensorKind.OBSTACLE_DISTANCE else 0.0
 
 
 def _end_with_parent(request_stop: Callable[[], None]) -> None:

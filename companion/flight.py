@@ -55,6 +55,8 @@ class Flight:
         self._asked_order = order
         self._retry_at_s = now_s
         self._announced_item = -1
+        self._blocked = False
+        """The committed trajectory is not clear any more, and not braked on yet."""
 
     @property
     def track_index(self) -> int:
@@ -91,7 +93,8 @@ class Flight:
             self.course.advance(now_s)
             yield from self._announce_progress()
         trouble = self._trouble(now_s, odometry_age_s, sensor_silent)
-        if trouble is not Reason.NONE and self.holding is Reason.NONE:
+        yield from self._note_blocked(trouble is Reason.NO_PATH and self.holding is Reason.NONE)
+        if trouble is not Reason.NONE and self.holding is Reason.NONE and not self._can_wait(trouble, now_s):
             yield from self.brake(trouble, now_s)
         if trouble not in BLIND and self._wants_plan(now_s):
             yield instructions.RequestPlan(self._request(now_s))
@@ -164,7 +167,7 @@ class Flight:
     def _wants_plan(self, now_s: float) -> bool:
         if self._asked is not None or now_s < self._retry_at_s or self.holding is Reason.STOPPED_BY_OPERATOR:
             return False
-        if self._new_order is not None or self.holding is not Reason.NONE:
+        if self._new_order is not None or self._blocked or self.holding is not Reason.NONE:
             return True
         latest = self.course.latest
         if self.course.reaches_end and now_s > latest.end_s - NEARLY_DONE_S:
@@ -200,6 +203,20 @@ class Flight:
             return Reason.NO_PATH
         ended = self.is_at_rest(now_s) and not self.course.reaches_end
         return Reason.NO_PATH if ended else Reason.NONE
+
+    def _note_blocked(self, blocked: bool) -> Iterator[Instruction]:
+        """A trajectory that is blocked ahead is a reason to plan anew, whatever its age."""
+        if blocked and not self._blocked:
+            self._retry_at_s = -np.inf
+            yield instructions.Note("blocked ahead")
+        self._blocked = blocked
+
+    def _can_wait(self, trouble: Reason, now_s: float) -> bool:
+        """Whether a new plan can be waited for: one could still stop on the way when it does not come."""
+        if trouble is not Reason.NO_PATH or self.is_at_rest(now_s):
+            return False
+        planner, later_s = self._crew.planner, now_s + self._crew.allowance_s
+        return planner.is_clear(planner.brake(self.course.trajectory(later_s), later_s), later_s)
 
     def _announce_progress(self) -> Iterator[Instruction]:
         seq = self.order.track.item_seq[self.track_index]
