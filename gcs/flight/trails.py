@@ -28,6 +28,11 @@ class Trail:
         self._positions_m.append(position_m)
         self._velocities_m_s.append(velocity_m_s)
 
+    @property
+    def newest_m(self) -> Array:
+        """(3,) ENU [m], of the last sample."""
+        return self._positions_m[-1]
+
     def positions_m(self, first: int = 0) -> Array:
         """(n, 3) ENU [m], from sample `first` on."""
         return np.array(self._positions_m[first:]).reshape(-1, 3)

@@ -7,7 +7,6 @@ import numpy.typing as npt
 import viser
 
 from gcs.view.framing import FOV_RAD, FROM_ABOVE, FROM_SOUTH_WEST, Margins, Pose, frame_box
-from gcs.view.labels import Lens
 from gcs.view.sightings import Sighting
 
 Array = npt.NDArray[np.float64]
@@ -69,15 +68,6 @@ class Cameras:
                 camera = clients[client_id].camera
                 offset_m = camera.position - camera.look_at
                 self._place(clients[client_id], Pose(places[sysid] + offset_m, places[sysid]))
-
-    def lens(self) -> Lens | None:
-        """The camera that was moved last; None before the first browser has come."""
-        cameras = [client.camera for client in self._server.get_clients().values()]
-        if not cameras:
-            return None
-        camera = max(cameras, key=lambda camera: camera.update_timestamp)
-        pose = Pose(camera.position, camera.look_at)
-        return Lens(pose, camera.fov, camera.image_width, camera.image_height)
 
     def _go(self, client: viser.ClientHandle, towards_camera: Array) -> None:
         self._followed.pop(client.client_id, None)

@@ -21,17 +21,9 @@ PALETTE: tuple[Rgb, ...] = (
 """Colours of the first vehicles: bright on dark, and neither the red of threats nor the orange of unmapped things."""
 
 GROUND: Rgb = (58, 68, 86)
-TERRAIN: Rgb = (92, 116, 118)
-GRID: Rgb = (66, 78, 96)
-GRID_MAIN: Rgb = (92, 108, 130)
-BOUNDS: Rgb = (110, 140, 180)
-OBSTACLE: Rgb = (122, 136, 158)
-OBSTACLE_EDGE: Rgb = (184, 198, 220)
 THREAT: Rgb = (255, 70, 70)
 UNMAPPED: Rgb = (255, 150, 40)
 TARGET: Rgb = (230, 236, 245)
-PAD: Rgb = (150, 166, 190)
-AIRFRAME: Rgb = (205, 214, 226)
 
 BRAND: Rgb = (45, 125, 235)
 CAUTION: Rgb = (196, 132, 30)

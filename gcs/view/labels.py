@@ -1,8 +1,11 @@
-"""How the name tags of vehicles and targets keep out of each other's way in the picture; pure."""
+"""Where the name tags of vehicles and targets stand in one browser's picture, so that they can be read; pure.
+
+Pixels are counted from the picture's upper left corner, x to the right and y downwards.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -10,17 +13,14 @@ import numpy.typing as npt
 from gcs.view.framing import Pose, camera_axes
 
 Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
-TAG_HEIGHT_PX = 22.0
-STEM_PX = 8.0
-"""Between what is named and the foot of its tag, at least."""
-CHARACTER_PX = 7.5
-PADDING_PX = 14.0
-STEP_PX, STEPS = 12.0, 16
-"""A tag stands in one of these heights above its anchor, so that it does not tremble."""
-SIDEWAYS_COST, BELOW_COST_PX = 0.8, 40.0
-MOST_SETTLED = 40
-"""More tags than this stand right above what they name: there is no room for order."""
+CELL_PX = 5.0
+"""The picture is divided into cells this wide; each is taken or free."""
+GAP_PX = 6.0
+"""Between what is named and its tag."""
+STEP_PX, RINGS = 26.0, 7
+"""A tag without room beside what it names moves away in steps, at most so many."""
 NEAREST_M = 1e-3
 
 
@@ -34,96 +34,100 @@ class Lens:
     height_px: int
 
     @property
-    def picture_axes(self) -> Array:
-        """(2, 3) the directions that are to the right and up in the picture."""
-        return np.array(camera_axes(self.pose.position_m - self.pose.look_at_m)[:2])
+    def axes(self) -> Array:
+        """(3, 3) unit vectors to the right, upwards and towards the camera."""
+        return np.array(camera_axes(self.pose.position_m - self.pose.look_at_m))
 
     def metres_per_pixel(self, points_m: Array) -> Array:
         """(n,) at the distances of (n, 3) points."""
-        _, _, back = camera_axes(self.pose.position_m - self.pose.look_at_m)
-        depths_m: Array = np.maximum((self.pose.position_m - points_m) @ back, NEAREST_M)
+        depths_m = np.maximum((self.pose.position_m - points_m) @ self.axes[2], NEAREST_M)
         return depths_m * (float(np.tan(self.fov_rad / 2)) / (self.height_px / 2))
 
-    def project(self, points_m: Array) -> Array:
-        """(n, 2) pixels, x to the right and y upwards from the picture's centre, of (n, 3) points before the camera."""
-        right, up, _ = camera_axes(self.pose.position_m - self.pose.look_at_m)
-        from_camera_m = points_m - self.pose.position_m
-        return np.stack((from_camera_m @ right, from_camera_m @ up), axis=1) / self.metres_per_pixel(points_m)[:, None]
+    def project(self, points_m: Array) -> tuple[Array, Bools]:
+        """(n, 2) pixels of (n, 3) points, and which of them are before the camera and in its picture."""
+        from_camera_m = (points_m - self.pose.position_m) @ self.axes.T
+        depths_m = -from_camera_m[:, 2]
+        scale = (self.height_px / 2) / (np.tan(self.fov_rad / 2) * np.maximum(depths_m, NEAREST_M))
+        pixels = np.stack(
+            (self.width_px / 2 + from_camera_m[:, 0] * scale, self.height_px / 2 - from_camera_m[:, 1] * scale), axis=1
+        )
+        inside = np.all((pixels >= 0.0) & (pixels < [self.width_px, self.height_px]), axis=1)
+        return pixels, inside & (depths_m > NEAREST_M)
 
 
-def tag_width_px(text: str) -> float:
-    """About how wide a tag with this text is."""
-    return CHARACTER_PX * len(text) + PADDING_PX
-
-
-def offsets_px(
+def place(
     anchors_px: Array,
-    widths_px: Sequence[float],
-    spans_px: Sequence[float],
-    picture_px: tuple[float, float],
+    sizes_px: Array,
+    spans_px: Array,
+    picture_px: tuple[int, int],
     before_px: Array | None = None,
+    *,
+    rings: int = RINGS,
+    kept_free_px: Sequence[tuple[float, float, float, float]] = (),
 ) -> Array:
-    """(n, 2) where the foot of each tag has to stand, from its anchor, so that no two cover each other or a vehicle.
+    """(n, 2) from each anchor to the middle of its tag; NaN for a tag for which there is no room.
 
-    The tags are placed one after the other, from the lowest anchor upwards: right above if there is room, else where
-    it stood before, else as near as it can be.
+    The tags are placed in the order in which they are given: the first ones get the best places.
 
     Args:
-        anchors_px: (n, 2) x to the right and y upwards, from the picture's centre.
-        widths_px: n widths of the tags.
-        spans_px: n widths and heights of what is named.
-        picture_px: width and height of the picture; tags outside of it are of no use.
-        before_px: (n, 2) the last result for the same tags, if there is one.
+        anchors_px: (n, 2) what is named.
+        sizes_px: (n, 2) width and height of the tags.
+        spans_px: (n,) width and height of what is named; no tag covers it.
+        picture_px: width and height of the picture; tags stay inside.
+        before_px: (n, 2) the last result for the same tags: a tag stays where it stood as long as it is free there.
+        rings: how far a tag may move away, in steps.
+        kept_free_px: left, top, right and bottom of what no tag may cover.
     """
-    count = len(widths_px)
-    if count > MOST_SETTLED:
-        return np.stack((np.zeros(count), np.array(spans_px) / 2 + STEM_PX), axis=1)
-    taken = _Taken(np.tile(anchors_px, (2, 1)), np.zeros((2 * count, 2)), np.array(picture_px) / 2, count)
-    taken.halves[:count] = np.array(spans_px)[:, None] / 2
-    result = np.zeros((count, 2))
-    for index in np.argsort(anchors_px[:, 1], kind="stable"):
-        feet, half = _candidates(widths_px[index], spans_px[index]), np.array([widths_px[index], TAG_HEIGHT_PX]) / 2
-        favoured = feet[:1] if before_px is None else np.array([feet[0], before_px[index]])
-        result[index] = taken.take(anchors_px[index], half, favoured, feet)
+    taken = _Cells(picture_px)
+    for left, top, right, bottom in kept_free_px:
+        taken.take(np.array([left + right, top + bottom]) / 2, ((right - left) / 2, (bottom - top) / 2))
+    for anchor, span in zip(anchors_px, spans_px, strict=True):
+        taken.take(anchor, (span / 2, span / 2))
+    result = np.full((len(anchors_px), 2), np.nan)
+    for index, (anchor, size) in enumerate(zip(anchors_px, sizes_px, strict=True)):
+        half = (float(size[0]) / 2, float(size[1]) / 2)
+        offsets = _candidates(round(float(size[0])), round(float(size[1])), round(float(spans_px[index])), rings)
+        stood = before_px[index : index + 1] if before_px is not None else offsets[:0]
+        for offset in (offsets[0], *stood, *offsets[1:]):
+            if taken.is_free(anchor + offset, half):
+                taken.take(anchor + offset, half)
+                result[index] = offset
+                break
     return result
 
 
-@dataclass
-class _Taken:
-    """Rectangles in the picture that are taken: `count` of them, by centre and half size (m, 2)."""
+class _Cells:
+    """Which cells of a picture are taken."""
 
-    centres: Array
-    halves: Array
-    half_picture: Array
-    count: int
+    def __init__(self, picture_px: tuple[int, int]) -> None:
+        self._width, self._height = picture_px
+        self._taken = np.zeros((int(self._height / CELL_PX) + 2, int(self._width / CELL_PX) + 2), dtype=bool)
 
-    def take(self, anchor: Array, half: Array, favoured: Array, feet: Array) -> Array:
-        """Take the place of a tag: on the first foot that is free, those in favour before the others."""
-        lift = np.array([0.0, half[1]])
-        foot = feet[0]
-        for tried in (favoured, feet):
-            free = self._free(anchor + tried + lift, half)
-            if free.any():
-                foot = tried[np.argmax(free)]
-                break
-        self.centres[self.count], self.halves[self.count] = anchor + foot + lift, half
-        self.count += 1
-        return foot
+    def is_free(self, middle: Array, half: tuple[float, float]) -> bool:
+        """Whether a rectangle lies in the picture and covers nothing."""
+        x, y = float(middle[0]), float(middle[1])
+        if not (half[0] <= x <= self._width - half[0] and half[1] <= y <= self._height - half[1]):
+            return False  # also where the place is not a number
+        return not self._taken[self._area(x, y, half)].any()
 
-    def _free(self, middles: Array, half: Array) -> npt.NDArray[np.bool_]:
-        """Which of the rectangles around (k, 2) places lie in the picture and cover nothing that is taken."""
-        gaps = np.abs(middles[:, None] - self.centres[: self.count]) - self.halves[: self.count] - half
-        inside = np.all(np.abs(middles) + half <= self.half_picture, axis=1)
-        return inside & np.all(np.any(gaps >= 0.0, axis=2), axis=1)
+    def take(self, middle: Array, half: tuple[float, float]) -> None:
+        self._taken[self._area(float(middle[0]), float(middle[1]), half)] = True
+
+    @staticmethod
+    def _area(x: float, y: float, half: tuple[float, float]) -> tuple[slice, slice]:
+        left, right = int(max(x - half[0], 0.0) / CELL_PX), int(max(x + half[0], 0.0) / CELL_PX)
+        top, bottom = int(max(y - half[1], 0.0) / CELL_PX), int(max(y + half[1], 0.0) / CELL_PX)
+        return slice(top, bottom + 1), slice(left, right + 1)
 
 
-@cache
-def _candidates(width_px: float, span_px: float) -> Array:
-    """(m, 2) feet around an anchor, the best first: above, then higher, to the sides and below."""
-    up = span_px / 2 + STEM_PX + STEP_PX * np.arange(STEPS)
-    down = -(span_px / 2 + STEM_PX + TAG_HEIGHT_PX) - STEP_PX * np.arange(STEPS)
-    aside = np.array([0.0, 0.35, -0.35, 0.7, -0.7, 1.05, -1.05]) * width_px
-    sideways, upwards = np.meshgrid(aside, np.concatenate((up, down)))
-    feet = np.column_stack((sideways.ravel(), upwards.ravel())).astype(np.float64)
-    costs = np.hypot(feet[:, 0] * SIDEWAYS_COST, feet[:, 1]) + np.where(feet[:, 1] < 0.0, BELOW_COST_PX, 0.0)
-    return feet[np.argsort(costs, kind="stable")]
+@lru_cache(maxsize=512)
+def _candidates(width_px: int, height_px: int, span_px: int, rings: int) -> Array:
+    """(m, 2) places of a tag's middle around its anchor, the best first: above, beside, below, then farther away."""
+    near = (span_px + height_px) / 2 + GAP_PX
+    beside = (span_px + width_px) / 2 + GAP_PX
+    places = [(0.0, -near), (beside, 0.0), (-beside, 0.0), (0.0, near)]
+    for ring in range(1, rings + 1):
+        far = near + ring * STEP_PX
+        aside = np.array([0.0, 0.45, -0.45, 0.9, -0.9]) * (width_px + ring * STEP_PX / 2)
+        places += [(float(x), y) for y in (-far, far) for x in aside]
+    return np.array(places)

@@ -1,61 +1,169 @@
 """The lines that change while vehicles fly: where they have been, and what lies ahead of them; pure.
 
-Each is a fixed number of segments per vehicle, so that a whole fleet's lines are one array that keeps its shape;
-segments that are not needed have no length.
+The whole fleet's lines are a few arrays. What moves keeps its shape, so that it is cheap to send: segments that are
+not needed have no length. What has been flown is sealed in chunks, thinned, and never sent again but for merging.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from gcs.fleet.vehicle_state import CompanionView
 from gcs.flight.trails import Trail
-from gcs.view import shapes
+from missions.bspline import uniform_rows
 from missions.tunnel import CompanionState
 
 Array = npt.NDArray[np.float64]
+Colours = npt.NDArray[np.uint8]
 
-CHUNK = 40
-"""Points of a trail that stay live; when there are more, they are sealed and never sent again."""
-
-AHEAD = 24
+CHUNK = 10
+"""Points of a trail that stay live; when there are more, they are sealed."""
+AHEAD = 16
 """Points of the line that shows what a companion is about to fly."""
+BATCH, MERGE, MOST_SEGMENTS = 320, 8, 20_000
+"""Sealed segments go out in batches; `MERGE` batches become one line, until it has more than `MOST_SEGMENTS`."""
+CATCH_UP = 6
+"""Of a trail that has grown by no more points than this since the last look, the newest one is enough."""
 
 STEERING = {CompanionState.ENGAGING, CompanionState.FLYING, CompanionState.LANDING}
 
 
-@dataclass
-class TrailLine:
-    """One vehicle's trail as a line: sealed chunks and a live tail.
+class FleetTrails:
+    """The trails of all vehicles of an order.
 
     Args:
+        count: how many vehicles.
         spacing_m: points nearer than this to the one before are left out.
     """
 
-    spacing_m: float
-    sealed: int = 0
-    live: int = 0
-    """How many of `tail_m` are points of the tail."""
-    tail_m: Array = field(default_factory=lambda: np.zeros((CHUNK, 3)))
-    _read: int = 0
+    def __init__(self, count: int, spacing_m: float) -> None:
+        self._spacing_m = spacing_m
+        self._tails_m = np.zeros((count, CHUNK, 3))
+        self._live, self._read = np.zeros(count, dtype=int), np.zeros(count, dtype=int)
 
-    def take(self, trail: Trail) -> list[Array]:
-        """Take in a trail's new samples; (CHUNK, 2, 3) segments for each chunk that has become full."""
-        if self._read == len(trail.times_s):
-            return []
-        chunks = []
-        for point_m in trail.positions_m(self._read):
-            self._read += 1
-            if self.live and np.linalg.norm(point_m - self.tail_m[self.live - 1]) < self.spacing_m:
-                continue
-            if self.live == CHUNK:
-                chunks.append(shapes.polyline(np.concatenate((self.tail_m, point_m[None]))))
-                self.live = 0
-            self.tail_m[self.live] = point_m
-            self.live += 1
-        self.sealed += len(chunks)
+    def take(self, trails: Sequence[Trail | None]) -> list[tuple[int, Array]]:
+        """Take in new samples; (vehicle's index, (CHUNK + 1, 3) points) for each chunk that has become full."""
+        counts = np.array([len(trail.times_s) if trail is not None else 0 for trail in trails], dtype=int)
+        chunks: list[tuple[int, Array]] = []
+        for index in np.flatnonzero(counts - self._read > CATCH_UP).tolist():
+            trail = trails[index]
+            assert trail is not None
+            chunks += self._catch_up(index, trail.positions_m(self._read[index]))
+            self._read[index] = counts[index]
+        grown = np.flatnonzero(counts > self._read)
+        if len(grown):
+            newest = [trail.newest_m for index in grown.tolist() if (trail := trails[index]) is not None]
+            chunks += self._append(grown, np.array(newest))
+            self._read[grown] = counts[grown]
         return chunks
+
+    def segments(self, positions_m: Array) -> Array:
+        """(n * CHUNK, 2, 3) what is not sealed yet, up to where the vehicles (n, 3) are."""
+        filled = (np.arange(CHUNK) < self._live[:, None])[..., None]
+        return _joined(np.where(filled, self._tails_m, positions_m[:, None]), positions_m[:, None])
+
+    def _catch_up(self, index: int, points_m: Array) -> list[tuple[int, Array]]:
+        """Take in (n, 3) points of one vehicle's past at once, thinned to the spacing along its way."""
+        tail_m = self._tails_m[index, : self._live[index]]
+        begun_m = tail_m[-1:] if len(tail_m) else points_m[:1]
+        along_m = np.cumsum(np.linalg.norm(np.diff(points_m, axis=0, prepend=begun_m), axis=1))
+        marks_m = np.arange(0.0 if not len(tail_m) else self._spacing_m, along_m[-1] + 1e-9, self._spacing_m)
+        chosen = np.unique(np.searchsorted(along_m, marks_m))
+        way_m = np.concatenate((tail_m, points_m[chosen]))
+        starts = range(0, len(way_m) - CHUNK, CHUNK)
+        chunks = [(index, way_m[start : start + CHUNK + 1]) for start in starts]
+        rest_m = way_m[len(chunks) * CHUNK :]
+        self._tails_m[index, : len(rest_m)], self._live[index] = rest_m, len(rest_m)
+        return chunks
+
+    def _append(self, indices: npt.NDArray[np.int64], points_m: Array) -> list[tuple[int, Array]]:
+        live = self._live[indices]
+        steps_m = np.linalg.norm(points_m - self._tails_m[indices, live - 1], axis=1)
+        far = (live == 0) | (steps_m >= self._spacing_m)
+        indices, points_m, live = indices[far], points_m[far], live[far]
+        full = live == CHUNK
+        chunks = [
+            (int(index), np.concatenate((self._tails_m[index], point_m[None])))
+            for index, point_m in zip(indices[full], points_m[full], strict=True)
+        ]
+        live = np.where(full, 0, live)
+        self._tails_m[indices, live] = points_m
+        self._live[indices] = live + 1
+        return chunks
+
+
+def thinned(points_m: Array, tolerance_m: float) -> Array:
+    """Fewer of (n, 3) points of a line: without those that lie about on the way between their neighbours."""
+    while len(points_m) > 2:
+        before, here, after = points_m[:-2:2], points_m[1:-1:2], points_m[2::2]
+        spare = np.linalg.norm(here - (before + after) / 2, axis=1) < tolerance_m
+        if not spare.any():
+            break
+        keep = np.ones(len(points_m), dtype=bool)
+        keep[1:-1:2] = ~spare
+        points_m = points_m[keep]
+    return points_m
+
+
+@dataclass(frozen=True)
+class SealedLine:
+    """A line that has been sealed: (n, 2, 3) segments [m] and the (n, 2, 3) colours of their ends."""
+
+    name: str
+    segments: Array
+    colours: Colours
+    rank: int
+    """How often it was merged."""
+
+
+@dataclass
+class SealedLines:
+    """What has been flown, as few lines: a batch that fills, and batches of batches."""
+
+    batch: Array = field(default_factory=lambda: np.zeros((BATCH, 2, 3)))
+    colours: Colours = field(default_factory=lambda: np.zeros((BATCH, 2, 3), dtype=np.uint8))
+    """The batch that is being filled; segments behind the last one have no length."""
+    _filled: int = 0
+    _lines: list[SealedLine] = field(default_factory=list)
+    _names: int = 0
+
+    def add(self, segments: Array, colour: tuple[int, int, int]) -> tuple[list[SealedLine], list[SealedLine]]:
+        """Seal (n, 2, 3) segments, n at most `BATCH`; the lines that are new by that, and those that are no more."""
+        new: list[SealedLine] = []
+        gone: list[SealedLine] = []
+        if self._filled + len(segments) > BATCH:
+            self._settle(new, gone)
+        end = self._filled + len(segments)
+        self.batch[self._filled : end] = segments
+        self.batch[end:] = segments[-1, 1]
+        self.colours[self._filled : end] = colour
+        self._filled = end
+        return new, gone
+
+    def _settle(self, new: list[SealedLine], gone: list[SealedLine]) -> None:
+        line = self._named(self.batch[: self._filled].copy(), self.colours[: self._filled].copy(), 0)
+        while True:
+            peers = [other for other in self._lines if other.rank == line.rank]
+            if len(peers) < MERGE - 1 or len(line.segments) * MERGE > MOST_SEGMENTS:
+                break
+            self._lines = [other for other in self._lines if other.rank != line.rank]
+            gone += peers
+            together = [*peers, line]
+            line = self._named(
+                np.concatenate([part.segments for part in together]),
+                np.concatenate([part.colours for part in together]),
+                line.rank + 1,
+            )
+        self._lines.append(line)
+        new.append(line)
+        self._filled = 0
+
+    def _named(self, segments: Array, colours: Colours, rank: int) -> SealedLine:
+        self._names += 1
+        return SealedLine(f"{self._names}", segments, colours, rank)
 
 
 @dataclass
@@ -73,15 +181,8 @@ class AheadLine:
         self.shown = trajectory is not None and alive and status is not None and status.state in STEERING
         if self.shown and trajectory is not None and companion.trajectory_revision != self._revision:
             self._revision = companion.trajectory_revision
-            self.points_m = trajectory.sample(np.linspace(trajectory.start_s, trajectory.end_s, AHEAD)).position_m
-
-
-def tails(lines: list[TrailLine], positions_m: Array) -> Array:
-    """(n * CHUNK, 2, 3) segments of what is not sealed yet of n trails, up to where the vehicles (n, 3) are."""
-    live = np.array([line.live for line in lines])
-    points_m = np.array([line.tail_m for line in lines])
-    points_m = np.where((np.arange(CHUNK) < live[:, None])[..., None], points_m, positions_m[:, None])
-    return _joined(points_m, positions_m[:, None])
+            control_m = trajectory.control_points_m
+            self.points_m = _basis(len(control_m)) @ control_m
 
 
 def ways_ahead(lines: list[AheadLine], positions_m: Array) -> Array:
@@ -98,3 +199,13 @@ def _joined(first_m: Array, then_m: Array) -> Array:
     """Segments (n * k, 2, 3) along n polylines of k + 1 points, each given in two parts (n, ., 3)."""
     points_m = np.concatenate((first_m, then_m), axis=1)
     return np.stack((points_m[:, :-1], points_m[:, 1:]), axis=2).reshape(-1, 2, 3)
+
+
+@lru_cache(maxsize=32)
+def _basis(count: int) -> Array:
+    """(AHEAD, count) weights of the control points of a uniform cubic B-spline at equal steps along it."""
+    phase = np.linspace(0.0, count - 3, AHEAD)
+    segment = np.minimum(phase.astype(int), count - 4)
+    weights = np.zeros((AHEAD, count))
+    weights[np.arange(AHEAD)[:, None], segment[:, None] + np.arange(4)] = uniform_rows(phase - segment)[0]
+    return weights

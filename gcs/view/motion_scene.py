@@ -1,6 +1,7 @@
-"""Where the vehicles have been and what lies ahead of them, as it is drawn.
+"""Where the vehicles have been and what lies ahead of them, as it is drawn for all browsers.
 
-Of each trail only the newest part is sent at every update; what is older is sealed, and goes out once.
+Of each trail only the newest part is sent at every update; what is older is sealed, thinned, and merged now and then,
+so that a browser that comes late in a long flight is sent few lines.
 """
 
 from collections.abc import Sequence
@@ -11,15 +12,19 @@ import viser
 
 from gcs.desk import Desk
 from gcs.flight.trails import Trails
-from gcs.view import lines
+from gcs.view import shapes
 from gcs.view.colours import Rgb, faded, vivid
-from gcs.view.lines import AHEAD, CHUNK, AheadLine, TrailLine
+from gcs.view.lines import AHEAD, CHUNK, AheadLine, FleetTrails, SealedLine, SealedLines, thinned, ways_ahead
 from gcs.view.sightings import Sighting
+from gcs.view.theme import DARK, Theme
 
 Array = npt.NDArray[np.float64]
 
 TRAIL_PX, AHEAD_PX = 2.5, 5.0
-WHITE: Rgb = (255, 255, 255)
+TOLERANCE_SHARE = 0.5
+"""By how much a thinned trail may be off, of its points' spacing."""
+MANY, SLOWER = 30, 2
+"""In a fleet with more vehicles than this, what lies ahead is sent at every second update."""
 
 
 class MotionScene:
@@ -33,63 +38,87 @@ class MotionScene:
     def __init__(self, scene: viser.SceneApi, spacing_m: float) -> None:
         self._scene, self._spacing_m = scene, spacing_m
         self._trails: Trails | None = None
-        self._past: dict[int, TrailLine] = {}
-        self._future: dict[int, AheadLine] = {}
-        self._sealed: list[viser.LineSegmentsHandle] = []
         self._drawn: list[int] = []
-        self._tails: viser.LineSegmentsHandle | None = None
-        self._ahead: viser.LineSegmentsHandle | None = None
+        self._future: dict[int, AheadLine] = {}
+        self._sealed: dict[str, viser.LineSegmentsHandle] = {}
+        self._updates, self._theme = 0, DARK
+        self._begin([])
+
+    def use(self, theme: Theme) -> None:
+        """Draw lines for a dark or a light page from now on."""
+        if theme is not self._theme:
+            self._theme, self._trails = theme, None
 
     def update(self, desk: Desk, seen: Sequence[Sighting], now_s: float) -> None:
         """Follow the vehicles to where they are now."""
-        if desk.trails is not self._trails:
-            self._forget(desk.trails)
-        if not seen:
+        order = [sighting.sysid for sighting in seen]
+        if desk.trails is not self._trails or order != self._drawn:
+            self._trails = desk.trails
+            self._begin(seen)
+        if not seen or self._trails is None:
             return
-        for sighting in seen:
-            self._seal(sighting)
-            companion_heard = sighting.state.companion_online(now_s)
-            self._future.setdefault(sighting.sysid, AheadLine()).take(sighting.state.companion, alive=companion_heard)
         positions_m = np.array([sighting.position_m for sighting in seen])
-        tails = lines.tails([self._past[sighting.sysid] for sighting in seen], positions_m)
-        ahead = lines.ways_ahead([self._future[sighting.sysid] for sighting in seen], positions_m)
-        if [sighting.sysid for sighting in seen] != self._drawn:
-            self._drawn = [sighting.sysid for sighting in seen]
-            self._tails = self._live("tails", tails, [_trail_colour(s) for s in seen], CHUNK, TRAIL_PX)
-            self._ahead = self._live(
-                "ahead", ahead, [faded(vivid(s.colour), WHITE, 0.2) for s in seen], AHEAD, AHEAD_PX
-            )
-        assert self._tails is not None
-        assert self._ahead is not None
-        self._tails.points = tails.astype(np.float32)
-        self._ahead.points = ahead.astype(np.float32)
+        by_sysid = self._trails.by_sysid
+        for index, points_m in self._past.take([by_sysid.get(sysid) for sysid in order]):
+            self._seal(points_m, self._colour(seen[index]))
+        self._send_batch()
+        self._tails.points = self._past.segments(positions_m).astype(np.float32)
+        self._updates += 1
+        if len(seen) <= MANY or self._updates % SLOWER == 0:
+            self._look_ahead(seen, positions_m, now_s)
 
-    def _forget(self, trails: Trails | None) -> None:
-        """Begin anew: the frame of the page has changed."""
-        for handle in self._sealed:
+    def _look_ahead(self, seen: Sequence[Sighting], positions_m: Array, now_s: float) -> None:
+        ahead = []
+        for sighting in seen:
+            line = self._future.setdefault(sighting.sysid, AheadLine())
+            line.take(sighting.state.companion, alive=sighting.state.companion_online(now_s))
+            ahead.append(line)
+        self._ahead.points = ways_ahead(ahead, positions_m).astype(np.float32)
+
+    def _begin(self, seen: Sequence[Sighting]) -> None:
+        """Begin anew: another frame, other vehicles, or another place in a recording."""
+        for handle in self._sealed.values():
             handle.remove()
-        self._trails, self._past, self._sealed = trails, {}, []
+        self._sealed, self._lines, self._batch_sent = {}, SealedLines(), True
+        self._drawn, self._past = [sighting.sysid for sighting in seen], FleetTrails(len(seen), self._spacing_m)
+        self._tails = self._live("/fleet/tails", CHUNK, [self._colour(s) for s in seen], TRAIL_PX)
+        self._ahead = self._live(
+            "/fleet/ahead", AHEAD, [faded(vivid(s.colour), self._theme.ahead, 0.2) for s in seen], AHEAD_PX
+        )
+        self._batch = self._line("/trails/newest", self._lines.batch, self._lines.colours, visible=False)
 
-    def _seal(self, sighting: Sighting) -> None:
-        line = self._past.setdefault(sighting.sysid, TrailLine(self._spacing_m))
-        trail = self._trails.by_sysid.get(sighting.sysid) if self._trails is not None else None
-        if trail is None:
+    def _seal(self, points_m: Array, colour: Rgb) -> None:
+        new, gone = self._lines.add(shapes.polyline(thinned(points_m, self._spacing_m * TOLERANCE_SHARE)), colour)
+        for line in gone:
+            self._sealed.pop(line.name).remove()
+        for line in new:
+            self._sealed[line.name] = self._draw_sealed(line)
+        self._batch_sent = False
+
+    def _send_batch(self) -> None:
+        if self._batch_sent:
             return
-        first = line.sealed
-        for index, chunk in enumerate(line.take(trail)):
-            name = f"/trails/{sighting.sysid}/{first + index}"
-            colour = _trail_colour(sighting)
-            handle = self._scene.add_line_segments(name, chunk, colour, thickness=TRAIL_PX, thickness_units="screen")
-            self._sealed.append(handle)
+        self._batch_sent = True
+        self._batch.points = self._lines.batch.astype(np.float32)
+        self._batch.colors = self._lines.colours
+        self._batch.visible = True
 
-    def _live(
-        self, name: str, segments: Array, own: Sequence[Rgb], per_vehicle: int, width_px: float
+    def _draw_sealed(self, line: SealedLine) -> viser.LineSegmentsHandle:
+        return self._line(f"/trails/{line.name}", line.segments, line.colours, visible=True)
+
+    def _line(
+        self, name: str, segments: Array, colours: npt.NDArray[np.uint8], *, visible: bool
     ) -> viser.LineSegmentsHandle:
-        tints = np.repeat(np.array(own, dtype=np.uint8), per_vehicle, axis=0)[:, None].repeat(2, axis=1)
         return self._scene.add_line_segments(
-            f"/fleet/{name}", segments, tints, thickness=width_px, thickness_units="screen"
+            name, segments, colours, thickness=TRAIL_PX, thickness_units="screen", visible=visible
         )
 
+    def _live(self, name: str, per_vehicle: int, own: Sequence[Rgb], width_px: float) -> viser.LineSegmentsHandle:
+        tints = np.repeat(np.array(own, dtype=np.uint8).reshape(-1, 3), per_vehicle, axis=0)[:, None].repeat(2, axis=1)
+        nowhere = np.zeros((len(tints), 2, 3))
+        return self._scene.add_line_segments(
+            name, nowhere, tints, thickness=width_px, thickness_units="screen", visible=bool(own)
+        )
 
-def _trail_colour(sighting: Sighting) -> Rgb:
-    return faded(vivid(sighting.colour), share=0.1)
+    def _colour(self, sighting: Sighting) -> Rgb:
+        return faded(vivid(sighting.colour), self._theme.shade, 0.2)

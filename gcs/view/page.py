@@ -2,22 +2,25 @@
 
 import asyncio
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import viser
 
 from gcs.desk import Desk, Intent
-from gcs.view import words
+from gcs.view import legend, words
+from gcs.view.browser import Browser
+from gcs.view.browsers import Browsers
 from gcs.view.cameras import Cameras
-from gcs.view.colours import BRAND, GRID, GRID_MAIN, TARGET, vivid
+from gcs.view.colours import BRAND, TARGET, Tone
 from gcs.view.motion_scene import MotionScene
+from gcs.view.overlay import Tag
 from gcs.view.panels import Panels, Press
 from gcs.view.plan_scene import PlanScene
+from gcs.view.replay_panel import ReplayPanel
 from gcs.view.sightings import Sighting, sightings, vehicle_colours, vehicle_order
-from gcs.view.tag_scene import Tag, TagScene
-from gcs.view.vehicle_scene import LEAST_SPAN_PX, VehicleScene
+from gcs.view.theme import DARK, LIGHT, Theme
+from gcs.view.vehicle_scene import least_span_px
 from gcs.view.world_scene import WorldScene, diagonal_m
 
 Array = npt.NDArray[np.float64]
@@ -28,16 +31,11 @@ TELL_INTERVAL_S = 0.25
 
 WATCHED_M = np.array([[-30.0, -30.0, 0.0], [30.0, 30.0, 15.0]])
 """What is framed where there is no mission, around where the first vehicle has its home."""
-TARGET_TAG_SCALE, TARGET_PX = 0.85, 14.0
+TARGET_PX = 14.0
 VEHICLE_FLATNESS = 0.6
 """A quadrotor is less high than wide in a picture from above."""
-PLAIN: dict[str, Any] = {
-    "cell_size": 5.0,
-    "section_size": 25.0,
-    "cell_color": GRID,
-    "section_color": GRID_MAIN,
-    "fade_distance": 250.0,
-}
+SELECTED, WARNING, ALARM = 1, 2, 3
+"""How urgent a tag is."""
 TRAIL_SPACING_SHARE = 1 / 2000
 POINT_SHARE = 1 / 350
 LEAST_TRAIL_SPACING_M = 0.05
@@ -55,66 +53,78 @@ class Page:
         self._server, self._desk, self._loop = server, desk, asyncio.get_running_loop()
         self._next_tell_s = -np.inf
         self._seen: list[Sighting] = []
-        server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, brand_color=BRAND)
+        self._tags: list[Tag] = []
+        self._theme = DARK
         server.gui.set_panel_label(TITLE)
-        _light(server.scene)
+        self._world: WorldScene | None = None
+        self._targets_m: list[Array] = []
         size_m = self._draw_surroundings()
         self._plan = PlanScene(server.scene, size_m * POINT_SHARE)
         self._motion = MotionScene(server.scene, max(LEAST_TRAIL_SPACING_M, size_m * TRAIL_SPACING_SHARE))
-        self._vehicles = VehicleScene(server.scene, self._ground_height_m)
-        self._tags = TagScene(server.scene)
         self._panels = Panels(server, desk, self._press, self._views())
+        self._replay = ReplayPanel(server.gui, desk.player) if desk.player is not None else None
+        self._browsers = Browsers(server, self._greet)
+        self._use(DARK)
 
     def update(self, now_s: float) -> None:
         """Bring the page up to date; what is shown has the station's clock, which in a recording can be moved."""
+        if self._replay is not None:
+            self._replay.update()
         shown_s = self._desk.station.now_s
         self._seen = sightings(self._desk)
-        lens = self._cameras.lens()
         with self._server.atomic():
-            self._vehicles.move(self._seen, lens)
             self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + TELL_INTERVAL_S
                 self._desk.collect_texts()
                 self._show_plan()
-                self._tags.show([*self._vehicle_tags(shown_s), *self._target_tags], lens)
+                self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
                 self._panels.update(self._seen, shown_s)
-            self._tags.move(
-                np.array([tagged.position_m for tagged in self._seen] + self._targets_m).reshape(-1, 3), lens
-            )
+        places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
+        tags = self._tags if len(self._tags) == len(places_m) else []
+        self._browsers.update(self._seen, tags, places_m[: len(tags)])
+
+    def _greet(self, client: viser.ClientHandle) -> Browser:
+        explained = legend.render(self._desk.mission, self._theme, simulated=self._desk.simulated)
+        return Browser(client, self._ground_height_m, self._pick, self._theme, explained)
+
+    def _use(self, theme: Theme) -> None:
+        """Draw everything dark or light from now on, in all browsers."""
+        if theme is not self._theme and self._world is not None:
+            self._world.draw(theme)
+        self._theme = theme
+        gui = self._server.gui
+        gui.configure_theme(dark_mode=theme.dark, show_logo=False, show_share_button=False, brand_color=BRAND)
+        _light(self._server.scene, theme)
+        if self._world is None:
+            _draw_plain(self._server.scene, theme)
+        self._motion.use(theme)
+        self._browsers.use(theme)
+
+    def _pick(self, sysid: int, joins: bool) -> None:
+        """A vehicle was clicked; called in a thread of viser."""
+        self._loop.call_soon_threadsafe(self._panels.pick, sysid, joins)
 
     def _vehicle_tags(self, now_s: float) -> list[Tag]:
-        return [
-            Tag(
-                f"vehicle {sighting.sysid}",
-                f"{sighting.name}  {words.mode_words(sighting.state, now_s)[0]}  "
-                f"{words.number_words(sighting.position_m[2])} m",
-                sighting.position_m,
-                vivid(sighting.colour),
-                LEAST_SPAN_PX * VEHICLE_FLATNESS,
-            )
-            for sighting in self._seen
-        ]
+        picked, span_px = self._panels.picked_out, least_span_px(len(self._seen)) * VEHICLE_FLATNESS
+        return [_vehicle_tag(sighting, now_s, span_px, selected=sighting.sysid in picked) for sighting in self._seen]
+
+    def _target_tags(self) -> list[Tag]:
+        targets = self._desk.mission.targets if self._desk.mission is not None else ()
+        return [Tag(f"target {target.name}", target.name, "", TARGET, TARGET_PX, -1, "target") for target in targets]
 
     def _draw_surroundings(self) -> float:
         """The world, or where there is no mission a plain; how large it is [m]."""
         mission = self._desk.mission
-        self._world: WorldScene | None = None
-        self._targets_m: list[Array] = []
-        self._target_tags: list[Tag] = []
         if mission is None:
-            self._server.scene.add_grid("/world/plain", infinite_grid=True, **PLAIN)
             self._cameras = Cameras(self._server, WATCHED_M[0], WATCHED_M[1], 1)
             return float(np.linalg.norm(WATCHED_M[1] - WATCHED_M[0]))
         self._targets_m = [np.array(target.position_m) for target in mission.targets]
-        self._target_tags = [
-            Tag(f"target {target.name}", target.name, place_m, TARGET, TARGET_PX, TARGET_TAG_SCALE)
-            for target, place_m in zip(mission.targets, self._targets_m, strict=True)
-        ]
         self._world = WorldScene(self._server, mission, simulated=self._desk.simulated)
-        bounds = mission.world.bounds
-        self._cameras = Cameras(self._server, bounds.low_enu_m, bounds.high_enu_m, len(mission.vehicles))
+        bounds, beyond_m = mission.world.bounds, mission.site.fence_margin_m * np.array([1.0, 1.0, 0.0])
+        low_m, high_m = bounds.low_enu_m - beyond_m, bounds.high_enu_m + beyond_m
+        self._cameras = Cameras(self._server, low_m, high_m, len(mission.vehicles))
         return diagonal_m(bounds)
 
     def _show_plan(self) -> None:
@@ -138,6 +148,8 @@ class Page:
             "Overview": (viser.Icon.CUBE, self._view(self._cameras.overview)),
             "Top": (viser.Icon.MAP_2, self._view(self._cameras.from_above)),
             "Follow": (viser.Icon.FOCUS_2, self._view(self._follow)),
+            "Light": (viser.Icon.SUN, self._view(lambda _: self._use(LIGHT))),
+            "Dark": (viser.Icon.MOON, self._view(lambda _: self._use(DARK))),
         }
 
     def _view(self, act: Callable[[viser.ClientHandle], None]) -> Press:
@@ -155,9 +167,35 @@ class Page:
             self._cameras.follow(client, (chosen or self._seen)[0])
 
 
-def _light(scene: viser.SceneApi) -> None:
+def _vehicle_tag(sighting: Sighting, now_s: float, span_px: float, *, selected: bool) -> Tag:
+    """Name, mode, battery and height of a vehicle; those with something wrong stand out."""
+    state = sighting.state
+    mode, tone = words.mode_words(state, now_s)
+    battery = "" if np.isnan(state.battery_percent) else f"{state.battery_percent:.0f} %"
+    if not np.isnan(state.battery_percent) and words.battery_tone(state.battery_percent) is Tone.BAD:
+        tone = Tone.BAD
+    details = " · ".join(filter(None, (mode, battery, f"{words.number_words(sighting.position_m[2])} m")))
+    urgency = {Tone.BAD: ALARM, Tone.WARN: WARNING}.get(tone, SELECTED if selected else 0)
+    look = {Tone.BAD: "vehicle bad", Tone.WARN: "vehicle warn"}.get(tone, "vehicle")
+    key = f"vehicle {sighting.sysid}"
+    return Tag(key, sighting.name, details, sighting.colour, span_px, urgency, look, selected)
+
+
+def _draw_plain(scene: viser.SceneApi, theme: Theme) -> None:
+    scene.add_grid(
+        "/world/plain",
+        infinite_grid=True,
+        cell_size=5.0,
+        section_size=25.0,
+        cell_color=theme.grid,
+        section_color=theme.grid_main,
+        fade_distance=250.0,
+    )
+
+
+def _light(scene: viser.SceneApi, theme: Theme) -> None:
     """Daylight from the south-west, and enough of the sky to see into the shade; no shadows, which cost most."""
     scene.configure_default_lights(enabled=False)
     scene.configure_environment_map(None)
-    scene.add_light_hemisphere("/light/sky", sky_color=(214, 226, 255), ground_color=(60, 62, 74), intensity=1.5)
-    scene.add_light_directional("/light/sun", color=(255, 246, 232), intensity=2.0, position=(-3.0, -5.0, 8.0))
+    scene.add_light_hemisphere("/light/sky", sky_color=theme.sky, ground_color=theme.soil, intensity=1.5)
+    scene.add_light_directional("/light/sun", color=(255, 246, 232), intensity=theme.sun, position=(-3.0, -5.0, 8.0))

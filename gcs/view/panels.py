@@ -67,6 +67,12 @@ class Panels:
         """The selected vehicle, if it is one and not all."""
         return set() if self._selector.value == next(iter(self._choices)) else self.selected
 
+    def pick(self, sysid: int, joins: bool) -> None:
+        """Address orders to a vehicle that was clicked."""
+        for name, chosen in self._choices.items():
+            if chosen == [sysid] and len(self._choices) > 2:
+                self._selector.value = name
+
     def update(self, seen: list[Sighting], now_s: float) -> None:
         """Bring everything up to date; viser sends only what has changed."""
         desk = self._desk

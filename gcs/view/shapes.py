@@ -125,6 +125,16 @@ def ring(points_m: Array) -> Array:
     return np.stack((points_m, np.roll(points_m, -1, axis=0)), axis=1)
 
 
+def dashed(segments: Array, dash_m: float) -> Array:
+    """(m, 2, 3) dashes about `dash_m` long, as far apart, along (n, 2, 3) segments."""
+    dashes = []
+    for start, end in segments:
+        count = max(1, round(float(np.linalg.norm(end - start)) / (2.0 * dash_m)))
+        along = (np.arange(count)[:, None] + np.array([0.25, 0.75])) / count
+        dashes.append(start + along[..., None] * (end - start))
+    return np.concatenate(dashes)
+
+
 def box_edges(low_m: Array, high_m: Array) -> Array:
     """(12, 2, 3) edges of the box between two corners."""
     outline = _rectangle(low_m, high_m)

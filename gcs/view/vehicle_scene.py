@@ -1,4 +1,4 @@
-"""The fleet as it is drawn: quadrotors, and the stems that show where above the ground they are."""
+"""The fleet as one browser is shown it: quadrotors, and the stems that show where above the ground they are."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,35 +9,54 @@ import viser
 from gcs.view import colours, shapes
 from gcs.view.labels import Lens
 from gcs.view.sightings import Sighting
+from gcs.view.theme import DARK, Theme
 
 Array = npt.NDArray[np.float64]
+GroundHeight = Callable[[Array], Array]
+"""(n,) height of the ground [m] below (n, 2) places."""
+Pick = Callable[[int, bool], None]
+"""Called with the system id of the vehicle that was clicked, and whether it joins those that are selected."""
 
 SPAN_M = 0.55
 """True size of a vehicle, from rotor tip to rotor tip."""
-LEAST_SPAN_PX = 46.0
+LEAST_SPAN_PX, LEAST_SPAN_OF_MANY_PX = 46.0, 24.0
 """A vehicle is drawn larger than it is where it would be smaller than this in the picture."""
+MANY = 30
+
+
+def least_span_px(count: int) -> float:
+    """How small a vehicle of such a fleet may become in the picture."""
+    return LEAST_SPAN_OF_MANY_PX if count > MANY else LEAST_SPAN_PX
 
 
 def spans_m(positions_m: Array, lens: Lens | None) -> Array:
     """(n,) sizes at which vehicles at (n, 3) positions are drawn."""
     if lens is None:
         return np.full(len(positions_m), SPAN_M)
-    return np.maximum(SPAN_M, LEAST_SPAN_PX * lens.metres_per_pixel(positions_m))
+    return np.maximum(SPAN_M, least_span_px(len(positions_m)) * lens.metres_per_pixel(positions_m))
 
 
 class VehicleScene:
     """All vehicles, as a few batched nodes.
 
     Args:
-        scene: of the page.
+        scene: of the page, or of one browser.
         ground_height_m: the height of the ground below (n, 2) places.
+        on_pick: see `Pick`; in a thread of viser.
+        theme: dark or light.
     """
 
-    def __init__(self, scene: viser.SceneApi, ground_height_m: Callable[[Array], Array]) -> None:
-        self._scene, self._ground_height_m = scene, ground_height_m
+    def __init__(
+        self, scene: viser.SceneApi, ground_height_m: GroundHeight, on_pick: Pick | None = None, theme: Theme = DARK
+    ) -> None:
+        self._scene, self._ground_height_m, self._on_pick, self._theme = scene, ground_height_m, on_pick, theme
         self._drawn: list[int] = []
         self._batches: list[viser.BatchedMeshHandle] = []
         self._stems: viser.LineSegmentsHandle | None = None
+
+    def use(self, theme: Theme) -> None:
+        """Draw the vehicles dark or light from now on."""
+        self._theme, self._drawn = theme, []
 
     def move(self, seen: Sequence[Sighting], lens: Lens | None) -> None:
         """Bring every vehicle to where it is now."""
@@ -48,27 +67,36 @@ class VehicleScene:
         sizes_m = spans_m(positions_m, lens)
         if [sighting.sysid for sighting in seen] != self._drawn:
             self._build(seen, positions_m, rotations, sizes_m)
+        places, turns, sizes = (values.astype(np.float32) for values in (positions_m, rotations, sizes_m))
         for batch in self._batches:
-            batch.batched_positions = positions_m.astype(np.float32)
-            batch.batched_wxyzs = rotations.astype(np.float32)
-            batch.batched_scales = sizes_m.astype(np.float32)
+            batch.batched_positions = places
+            batch.batched_wxyzs = turns
+            batch.batched_scales = sizes
         assert self._stems is not None
         self._stems.points = self._stem_lines(positions_m).astype(np.float32)
 
     def _build(self, seen: Sequence[Sighting], positions_m: Array, rotations: Array, sizes_m: Array) -> None:
         self._drawn = [sighting.sysid for sighting in seen]
         own = np.array([colours.vivid(sighting.colour) for sighting in seen], dtype=np.uint8)
-        grey = np.tile(np.array(colours.AIRFRAME, np.uint8), (len(seen), 1))
+        grey = np.tile(np.array(self._theme.airframe, np.uint8), (len(seen), 1))
         quadrotor = shapes.quadrotor()
         self._batches = [
             self._batch("hull", quadrotor.hull, own, positions_m, rotations, sizes_m),
             self._batch("airframe", quadrotor.airframe, grey, positions_m, rotations, sizes_m),
             self._batch("rotors", quadrotor.rotors, own, positions_m, rotations, sizes_m, opacity=0.45),
         ]
+        for batch in self._batches if self._on_pick is not None else ():
+            batch.on_click(lambda event: self._clicked(event.instance_index, joins=False))
+            batch.on_click(modifier="shift")(lambda event: self._clicked(event.instance_index, joins=True))
         tints = np.repeat(own[:, None], 2, axis=1)
         self._stems = self._scene.add_line_segments(
             "/fleet/stems", self._stem_lines(positions_m), tints, thickness=1.0, thickness_units="screen"
         )
+
+    def _clicked(self, index: int | None, *, joins: bool) -> None:
+        drawn = self._drawn
+        if index is not None and index < len(drawn) and self._on_pick is not None:
+            self._on_pick(drawn[index], joins)
 
     def _batch(
         self,

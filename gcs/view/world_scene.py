@@ -8,17 +8,15 @@ import viser
 
 from gcs.view import colours, shapes
 from gcs.view.colours import Rgb
+from gcs.view.ground_scene import GroundScene, grid_spacing_m
 from gcs.view.ground_text import written
+from gcs.view.theme import DARK, Theme
 from missions import obstacles
 from missions.mission import Mission
-from missions.obstacles import Obstacles
 from missions.world import Bounds, Box, Cylinder, World
 
 Array = npt.NDArray[np.float64]
 
-TERRAIN_CELLS = 160
-GRID_LINES = 20
-"""About as many lies the grid's spacing between the sides of the flight range."""
 MARKER_SHARE = 0.014
 """A target's size, of the diagonal of the flight range."""
 TEXT_SHARE = 0.02
@@ -30,13 +28,6 @@ def diagonal_m(bounds: Bounds) -> float:
     return float(np.linalg.norm(bounds.high_enu_m - bounds.low_enu_m))
 
 
-def grid_spacing_m(extent_m: float) -> float:
-    """The spacing 1, 2 or 5 times a power of ten that cuts an extent into about `GRID_LINES` parts."""
-    wanted = extent_m / GRID_LINES
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(min((step * power for step in (1, 2, 5, 10)), key=lambda spacing: abs(np.log(spacing / wanted))))
-
-
 class WorldScene:
     """Everything of a mission that stands still.
 
@@ -44,16 +35,25 @@ class WorldScene:
         server: of the page.
         mission: what is drawn.
         simulated: the simulator flies in it, so what no planner is told of is there too, and drawn as unmapped.
+        theme: dark or light.
     """
 
-    def __init__(self, server: viser.ViserServer, mission: Mission, *, simulated: bool) -> None:
+    def __init__(self, server: viser.ViserServer, mission: Mission, *, simulated: bool, theme: Theme = DARK) -> None:
         self._scene = server.scene
         self._mission, self._world = mission, mission.world if simulated else mission.world.as_known()
-        self._ground = obstacles.pack(World(bounds=mission.world.bounds, peaks=self._world.peaks))
+        peaks = obstacles.pack(World(bounds=mission.world.bounds, peaks=self._world.peaks))
+        self._ground = GroundScene(server.scene, mission.world.bounds, peaks)
         self._size_m = diagonal_m(mission.world.bounds)
         self._text_m = self._size_m * TEXT_SHARE
         self._target_colours: Mapping[str, Rgb] = {}
-        self._draw_ground(mission.world.bounds, self._ground)
+        self.draw(theme)
+
+    def draw(self, theme: Theme) -> None:
+        """Draw everything, in place of what was drawn before."""
+        self._theme = theme
+        self._ground.draw(theme)
+        self._draw_bounds(self._mission.world.bounds)
+        self._draw_fence(self._mission.world.bounds)
         self._draw_obstacles()
         self._draw_threats()
         self._draw_movers()
@@ -62,7 +62,7 @@ class WorldScene:
 
     def ground_height_m(self, places_m: Array) -> Array:
         """(n,) height of the ground [m] at (n, 2 or 3) places."""
-        return obstacles.terrain_height(places_m, self._ground)
+        return self._ground.height_m(places_m)
 
     def colour_targets(self, by_target: Mapping[str, Rgb]) -> None:
         """Give targets the colours of the vehicles that fly to them."""
@@ -70,24 +70,28 @@ class WorldScene:
             self._target_colours = dict(by_target)
             self._draw_targets()
 
-    def _draw_ground(self, bounds: Bounds, ground: Obstacles) -> None:
-        cells = TERRAIN_CELLS if len(ground.peaks) else 1
-        mesh = shapes.terrain(bounds, ground, cells)
-        colour = colours.TERRAIN if len(ground.peaks) else colours.GROUND
-        self._scene.add_mesh_simple("/world/ground", mesh.vertices, mesh.faces, color=colour, side="double")
-        extent_m = max(bounds.east_m[1] - bounds.east_m[0], bounds.north_m[1] - bounds.north_m[0])
-        spacing_m = grid_spacing_m(extent_m)
-        for name, every, colour in (("grid", 1, colours.GRID), ("main", 5, colours.GRID_MAIN)):
-            lines = shapes.draped(bounds, ground, spacing_m * every, cells)
-            self._lines(f"/world/{name}", lines, colour, 1.0)
-        self._lines("/world/bounds", shapes.box_edges(bounds.low_enu_m, bounds.high_enu_m), colours.BOUNDS, 1.5)
+    def _draw_bounds(self, bounds: Bounds) -> None:
+        edges = shapes.box_edges(bounds.low_enu_m, bounds.high_enu_m)
+        self._lines("/world/bounds", edges, self._theme.bounds, 1.2)
         self._draw_dimensions(bounds)
+
+    def _draw_fence(self, bounds: Bounds) -> None:
+        """The geofence on the ground, dashed: it is as high as the sky for those who look at it from above."""
+        margin_m = self._mission.site.fence_margin_m
+        (west, east), (south, north) = bounds.east_m, bounds.north_m
+        corners = np.array([[west, south], [east, south], [east, north], [west, north]])
+        outwards = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * margin_m
+        lift_m = bounds.up_m[0] + 0.001 * self._size_m
+        fence = np.column_stack((corners + outwards, np.full(4, lift_m)))
+        self._lines("/world/fence", shapes.dashed(shapes.ring(fence), 0.012 * self._size_m), self._theme.fence, 2.0)
 
     def _draw_dimensions(self, bounds: Bounds) -> None:
         (west, east), (south, north) = bounds.east_m, bounds.north_m
         away_m = 1.2 * self._text_m
-        self._write(f"{east - west:g} m", np.array([(west + east) / 2, south - away_m, 0.0]), colours.BOUNDS)
-        self._write(f"{north - south:g} m", np.array([west - 2.2 * away_m, (south + north) / 2, 0.0]), colours.BOUNDS)
+        self._write(f"{east - west:g} m", np.array([(west + east) / 2, south - away_m, 0.0]), self._theme.writing)
+        self._write(
+            f"{north - south:g} m", np.array([west - 2.2 * away_m, (south + north) / 2, 0.0]), self._theme.writing
+        )
 
     def _draw_obstacles(self) -> None:
         for box in self._world.boxes:
@@ -99,9 +103,9 @@ class WorldScene:
 
     def _draw_solid(self, thing: Box | Cylinder, mesh: shapes.Mesh, edges: Array) -> None:
         if thing.known:
-            self._mesh(f"/world/{thing.name}", mesh, colours.OBSTACLE, opacity=0.85)
-            self._lines(f"/world/{thing.name}/edges", edges, colours.OBSTACLE_EDGE, 1.5)
-            self._write_before(thing.name, mesh, colours.OBSTACLE_EDGE)
+            self._mesh(f"/world/{thing.name}", mesh, self._theme.obstacle, opacity=0.85)
+            self._lines(f"/world/{thing.name}/edges", edges, self._theme.obstacle_edge, 1.5)
+            self._write_before(thing.name, mesh, self._theme.obstacle_edge)
         else:
             spacing_m = grid_spacing_m(float(np.ptp(mesh.vertices, axis=0).max()) * 2)
             self._mesh(f"/world/{thing.name}", mesh, colours.UNMAPPED, opacity=0.25)
@@ -138,10 +142,10 @@ class WorldScene:
         self._coloured_lines("/world/pads", rings, fleet, 2.0)
         if self._mission.launch_point_m is not None:
             place = np.array(self._mission.launch_point_m)
-            self._write("launch point", place - np.array([0.0, self._text_m, 0.0]), colours.PAD)
+            self._write("launch point", place - np.array([0.0, self._text_m, 0.0]), self._theme.writing)
         if self._mission.launch_zone_radius_m > 0.0 and self._mission.launch_point_m is not None:
             zone = shapes.circle(self._mission.launch_zone_radius_m, 64, self._mission.launch_point_m)
-            self._lines("/world/launch zone", shapes.ring(self._on_ground(zone)), colours.PAD, 1.0)
+            self._lines("/world/launch zone", shapes.ring(self._on_ground(zone)), self._theme.writing, 1.0)
 
     def _draw_targets(self) -> None:
         targets = self._mission.targets

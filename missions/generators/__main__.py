@@ -3,27 +3,10 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
-
-import msgspec
-import yaml
 
 from missions.errors import MissionError
 from missions.generators.catalogue import Kind, generate
-from missions.mission import Mission
-
-
-def to_yaml(mission: Mission) -> str:
-    """The mission as a mission file, which `load_mission` reads back as the same mission."""
-    return yaml.safe_dump(
-        _without_none(msgspec.to_builtins(mission)), sort_keys=False, default_flow_style=None, width=120
-    )
-
-
-def _without_none(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
-    return [_without_none(inner) for inner in value] if isinstance(value, list | tuple) else value
+from missions.mission_file import to_yaml
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -105,7 +105,8 @@ async def test_what_comes_from_outside_is_shown_as_text_and_a_reload_keeps_every
         await expect(page.locator(".gcs-head h1")).to_have_text("indoor")
         await expect(row(page, "alpha")).to_contain_text("Offboard")
         await expect(button(page, "Hold")).to_be_enabled()
-        assert {"/plan/curves", "/fleet/hull", "/tags/vehicle 1", "/world/crate"} <= await scene(page)
+        assert {"/plan/curves", "/fleet/hull", "/world/crate"} <= await scene(page)
+        await expect(page.locator(".gcs-overlay .tag", has_text="alpha")).to_contain_text("Offboard · 96 %")
         await page.reload()
 
 

@@ -8,8 +8,9 @@ import pytest
 from missions import obstacles
 from missions.errors import MissionError
 from missions.generators import HARD, Kind, canyon, fleet, floors, forest, generate, maze, terrain
-from missions.generators.__main__ import main, to_yaml
+from missions.generators.__main__ import main
 from missions.mission import Mission, load_mission
+from missions.mission_file import to_yaml
 
 SEEDS = range(5)
 

@@ -1,10 +1,24 @@
 """Trails and what lies ahead, as lines."""
 
 import numpy as np
+import pytest
 
 from gcs.fleet.vehicle_state import CompanionView
 from gcs.flight.trails import Trail
-from gcs.view.lines import AHEAD, CHUNK, AheadLine, Array, TrailLine, tails, ways_ahead
+from gcs.view.lines import (
+    AHEAD,
+    BATCH,
+    CHUNK,
+    MERGE,
+    AheadLine,
+    Array,
+    FleetTrails,
+    SealedLine,
+    SealedLines,
+    thinned,
+    ways_ahead,
+)
+from gcs.view.shapes import polyline
 from missions.trajectory import Trajectory
 from missions.tunnel import CompanionState, CompanionStatus
 
@@ -17,53 +31,100 @@ def flown(metres: float, step_m: float = 0.1) -> Trail:
     return trail
 
 
-def test_a_trail_is_drawn_whole_and_without_gaps():
-    line, trail = TrailLine(spacing_m=0.05), flown(20.0)
-    chunks = line.take(trail)
-    now_m = np.array([20.0, 2.0, 1.5])
-    tail = tails([line], now_m[None])
-    drawn = np.concatenate([*chunks, tail])
-    np.testing.assert_allclose(drawn[0, 0], [0.0, 2.0, 1.5])
-    np.testing.assert_allclose(drawn[-1, 1], now_m)
-    np.testing.assert_allclose(drawn[:-1, 1], drawn[1:, 0])
-    np.testing.assert_allclose(np.diff(drawn[:, 0, 0]).clip(0.0, 0.1 + 1e-9), np.diff(drawn[:, 0, 0]))
+def go_on(trail: Trail, step_m: float = 0.1) -> None:
+    trail.append(trail.times_s[-1] + 0.1, trail.newest_m + np.array([step_m, 0.0, 0.0]), np.zeros(3))
+
+
+def drawn(chunks: list[tuple[int, Array]], tail: Array) -> Array:
+    return np.concatenate([*(polyline(points_m) for _, points_m in chunks), tail])
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_a_trail_is_drawn_whole_and_without_gaps_whether_it_is_seen_growing_or_late(live: bool):
+    trail, lines, chunks = flown(0.05), FleetTrails(1, spacing_m=0.05), []
+    for _ in range(200):
+        go_on(trail)
+        chunks += lines.take([trail]) if live else []
+    chunks += lines.take([trail])
+    now_m = np.array([[20.0, 2.0, 1.5]])
+    segments = drawn(chunks, lines.segments(now_m))
+    np.testing.assert_allclose(segments[0, 0], [0.0, 2.0, 1.5], atol=0.11)
+    np.testing.assert_allclose(segments[-1, 1], now_m[0])
+    np.testing.assert_allclose(segments[:-1, 1], segments[1:, 0])
+    assert np.all(np.diff(segments[:, 0, 0]) < 0.1 + 1e-9)
+    assert all(points_m.shape == (CHUNK + 1, 3) for _, points_m in chunks)
+    assert len(chunks) in {19, 20}
 
 
 def test_sealed_chunks_are_handed_out_once_and_the_tail_keeps_its_size():
-    line, trail, now_m = TrailLine(spacing_m=0.05), flown(20.0), np.zeros((1, 3))
-    sealed = line.take(trail)
-    assert len(sealed) == line.sealed == 4
-    assert all(chunk.shape == (CHUNK, 2, 3) for chunk in sealed)
-    assert line.take(trail) == []
+    lines, trail, now_m = FleetTrails(1, spacing_m=0.05), flown(4.0), np.zeros((1, 3))
+    assert len(lines.take([trail])) == 3
+    assert lines.take([trail]) == []
     for _ in range(3 * CHUNK):
-        trail.append(trail.times_s[-1] + 0.1, trail.positions_m()[-1] + np.array([0.1, 0.0, 0.0]), np.zeros(3))
-        line.take(trail)
-        assert tails([line], now_m).shape == (CHUNK, 2, 3)
-    assert line.sealed == 7
+        go_on(trail)
+        lines.take([trail])
+        assert lines.segments(now_m).shape == (CHUNK, 2, 3)
 
 
 def test_a_hovering_vehicle_leaves_no_trail():
-    line, trail = TrailLine(spacing_m=0.5), flown(0.4)
-    assert line.take(trail) == []
-    tail = tails([line], np.array([[0.4, 2.0, 1.5]]))
-    np.testing.assert_allclose(tail[0, 0], [0.0, 2.0, 1.5])
-    np.testing.assert_allclose(tail[0, 1:], [[0.4, 2.0, 1.5]])
+    lines, trail = FleetTrails(1, spacing_m=0.5), flown(0.05)
+    for step in range(50):
+        go_on(trail, 0.1 * (-1) ** step)
+        assert lines.take([trail]) == []
+    tail = lines.segments(np.array([[0.4, 2.0, 1.5]]))
     np.testing.assert_allclose(tail[1:], np.tile([0.4, 2.0, 1.5], (CHUNK - 1, 2, 1)))
 
 
 def test_before_anything_is_known_the_tail_is_a_point():
-    tail = tails([TrailLine(0.1)], np.array([[1.0, 2.0, 3.0]]))
-    np.testing.assert_array_equal(tail, np.tile([1.0, 2.0, 3.0], (CHUNK, 2, 1)))
+    lines = FleetTrails(1, 0.1)
+    assert lines.take([None]) == []
+    np.testing.assert_array_equal(lines.segments(np.array([[1.0, 2.0, 3.0]])), np.tile([1.0, 2.0, 3.0], (CHUNK, 2, 1)))
 
 
 def test_every_vehicle_has_its_own_part_of_the_fleets_lines():
-    fleet, ends_m = [TrailLine(0.05), TrailLine(0.05)], np.array([[1.0, 2.0, 1.5], [2.0, 2.0, 1.5]])
-    for line, metres in zip(fleet, (1.0, 2.0), strict=True):
-        line.take(flown(metres))
-    together = tails(fleet, ends_m)
-    for index, line in enumerate(fleet):
+    ends_m = np.array([[0.7, 2.0, 1.5], [0.9, 2.0, 1.5]])
+    fleet = FleetTrails(2, 0.05)
+    fleet.take([flown(0.7), flown(0.9)])
+    together = fleet.segments(ends_m)
+    for index, metres in enumerate((0.7, 0.9)):
+        alone = FleetTrails(1, 0.05)
+        alone.take([flown(metres)])
         own = together[index * CHUNK : (index + 1) * CHUNK]
-        np.testing.assert_array_equal(own, tails([line], ends_m[index : index + 1]))
+        np.testing.assert_array_equal(own, alone.segments(ends_m[index : index + 1]))
+
+
+def test_a_straight_line_is_thinned_to_its_ends_and_a_bend_is_kept():
+    straight = np.column_stack((np.arange(11.0), np.zeros(11), np.zeros(11)))
+    assert len(thinned(straight, 0.01)) <= 4
+    angles = np.linspace(0.0, np.pi, 11)
+    bend = 5.0 * np.stack((np.cos(angles), np.sin(angles), np.zeros(11)), axis=1)
+    np.testing.assert_array_equal(thinned(bend, 0.01), bend)
+    for points in (straight, bend):
+        np.testing.assert_array_equal(thinned(points, 10.0)[[0, -1]], points[[0, -1]])
+
+
+def seal(sealed: SealedLines, count: int) -> dict[str, SealedLine]:
+    """Seal so many chunks of ten segments; the lines that stand then."""
+    standing: dict[str, SealedLine] = {}
+    for number in range(count):
+        points_m = np.column_stack((10.0 * number + np.arange(11.0), np.zeros(11), np.zeros(11)))
+        new, gone = sealed.add(polyline(points_m), (number % 256, 0, 0))
+        for line in gone:
+            del standing[line.name]
+        standing |= {line.name: line for line in new}
+    return standing
+
+
+def test_a_long_flight_is_few_lines_and_none_of_it_is_lost():
+    sealed, chunks = SealedLines(), 40 * BATCH // 10
+    standing = seal(sealed, chunks)
+    assert len(standing) < 2 * MERGE
+    everything = np.concatenate([*(line.segments for line in standing.values()), sealed.batch])
+    lengths = np.linalg.norm(everything[:, 1] - everything[:, 0], axis=1)
+    begins = np.sort(everything[lengths > 0.0][:, 0, 0])
+    np.testing.assert_array_equal(begins, np.arange(10.0 * chunks))
+    for line in standing.values():
+        np.testing.assert_array_equal(line.colours[:, 0, 0], (line.segments[:, 0, 0] // 10) % 256)
 
 
 def companion(state: CompanionState = CompanionState.FLYING, revision: int = 1, end_m: float = 8.0) -> CompanionView:

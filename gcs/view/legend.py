@@ -1,0 +1,52 @@
+"""The legend: what the things in the scene are, for those that this scene has; pure."""
+
+from collections.abc import Iterator
+from html import escape
+
+from gcs.view.colours import THREAT, UNMAPPED, Rgb, css
+from gcs.view.theme import Theme
+from missions.mission import Mission
+
+VEHICLE: Rgb = (77, 184, 255)
+AHEAD: Rgb = (190, 224, 255)
+SEEN: Rgb = (255, 214, 120)
+
+Entry = tuple[str, Rgb, str]
+"""CSS class of the sample, its colour, and what it means."""
+
+
+def render(mission: Mission | None, theme: Theme, *, simulated: bool) -> str:
+    """The legend as HTML; it folds."""
+    items = "".join(
+        f'<li><s class="{sample}" style="--own:{css(colour)}"></s>{escape(meaning)}</li>'
+        for sample, colour, meaning in _entries(mission, theme, simulated)
+    )
+    return f'<details class="gcs-legend"><summary>Legend</summary><ul>{items}</ul></details>'
+
+
+def _entries(mission: Mission | None, theme: Theme, simulated: bool) -> Iterator[Entry]:
+    yield "line", AHEAD, "flown next (on board)"
+    yield "line", VEHICLE, "flown so far"
+    if mission is None:
+        return
+    yield "thin", VEHICLE, "planned by the cloud"
+    yield "dot", VEHICLE, "track point"
+    yield "diamond", VEHICLE, "target, in its vehicle's colour"
+    yield "dot", SEEN, "seen by a vehicle"
+    yield "area", theme.bounds, "flight range"
+    yield "dashed", theme.fence, "geofence"
+    world = mission.world
+    if world.boxes or world.cylinders:
+        yield "area", theme.obstacle_edge, "obstacle"
+    if world.threats:
+        yield "area", THREAT, "threat: not to be entered"
+    if simulated and _has_unmapped(mission):
+        yield "area", UNMAPPED, "there, but not on the map"
+    if world.peaks:
+        yield "thin", theme.contour, "contour line"
+
+
+def _has_unmapped(mission: Mission) -> bool:
+    world = mission.world
+    mapped = (*world.boxes, *world.cylinders, *world.threats, *world.peaks)
+    return bool(world.movers) or any(not thing.known for thing in mapped)
