@@ -66,7 +66,9 @@ class PilotSettings:
     replan_age_s: float = 1.0
     """A committed trajectory is replaced when it is this old."""
     retry_s: float = 0.3
-    """Between a failed plan and the next attempt."""
+    """Between a failed plan and the next attempt ..."""
+    conflict_retry_s: float = 0.1
+    """... where the committed trajectory meets something."""
     planning_allowance_wall_s: float = 0.06
     """A plan begins this much in the future: search and thread switches fit in (wall clock)."""
     lateness_wall_s: float = 0.06
@@ -105,6 +107,10 @@ class CompanionSettings:
     sensor: SensorKind = SensorKind.LIDAR
     lidar_address: str = "127.0.0.1:56300"
     """HOST:PORT at which the lidar's packets come in."""
+    fleet_link: str = "udpout://127.0.0.1:14980"
+    """Where the other companions are reached."""
+    fleet_port: int = 14700
+    """Bound for a relay."""
     deadman_s: float = 0.5
     report_bytes_s: float = 3300.0
     """Of the link, for what was seen [bytes/s of vehicle time]; with status and trajectories it makes 4 kB/s."""

@@ -46,8 +46,8 @@ class StraightPlanner:
     def lay_guide(self, track: Track, index: int, from_m: np.ndarray) -> Guide:
         return lay_guide(track, index, from_m, INDOOR.onboard.horizon_m, self.limits)
 
-    def is_clear(self, trajectory: Trajectory, now_s: float) -> bool:
-        return self.clear
+    def conflict_s(self, trajectory: Trajectory, now_s: float) -> float:
+        return np.inf if self.clear else now_s
 
     def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
         return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)
@@ -77,6 +77,7 @@ class Rig:
     answers_plans: bool = True
     follows: bool = True
     """The vehicle does what its setpoints say."""
+    sensor_silent: bool = False
     planner: Any = None
 
     def __post_init__(self) -> None:
@@ -107,7 +108,7 @@ class Rig:
         while self.now_s < end_s and not until():
             self.now_s += 0.02
             n_before = len(out)
-            out += self.feed(self.odometry(), events.Tick(0.0))
+            out += self.feed(self.odometry(), events.Tick(0.0, sensor_silent=self.sensor_silent))
             for wanted in of(out[n_before:], instructions.RequestPlan) if self.answers_plans else []:
                 out += self.feed(self.answer(wanted.request))
         return out
