@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner experiment-modes check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-link experiment-modes fuzz check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -57,6 +57,12 @@ bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, 
 
 experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10
 	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS)
+bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK and MAVProxy, and a fleet of a hundred: make bench-link SEEDS=0:30 [BENCH=--quick]
+	$(BIN)/python -m tests.benchmarks.link --seeds $(SEEDS) $(BENCH)
+
+SECONDS ?= 60
+fuzz: $(VENV)/.installed-dev  ## hostile traffic on all receive paths: make fuzz SECONDS=60
+	$(BIN)/python -m tests.fuzz --seconds $(SECONDS)
 
 check: $(VENV)/.installed-dev  ## the fast checks: format, lint, types, import contracts
 	$(BIN)/ruff format --check .
