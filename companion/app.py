@@ -15,6 +15,7 @@ from companion.errors import CommandRefused, CompanionError
 from companion.events import Event, FlightMode
 from companion.fault_injection import FaultInjection
 from companion.fleet.desk import FleetDesk
+from companion.fleet.neighbour import Neighbour
 from companion.instructions import Instruction
 from companion.journal import Journal
 from companion.link.autopilot import Autopilot
@@ -164,14 +165,15 @@ class App:
         """Show scans to the planner until there is none."""
         while (scan := self._unseen) is not None:
             self._unseen = None
-            await self.work(partial(self._take_in, scan))
+            others = self.fleet.exchange.neighbours(self._now_s) if self.fleet is not None else ()
+            await self.work(partial(self._take_in, scan, others))
             for block in self._observations.due(scan.sensor_enu_m, scan.time_s):
                 self.autopilot.send_tunnel(PayloadType.OCCUPANCY, block)
         self._observing = False
 
-    def _take_in(self, scan: Scan) -> None:
+    def _take_in(self, scan: Scan, others: tuple[Neighbour, ...]) -> None:
         """Show a scan to the planner; now and then, note what the ground does not know of yet."""
-        self.planner.observe(scan)
+        self.planner.observe(scan, others)
         if scan.time_s - self._noted_s >= self.settings.pilot.report_interval_s:
             self._noted_s = scan.time_s
             self._observations.update(*self.planner.certain(), scan.time_s)

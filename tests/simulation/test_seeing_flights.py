@@ -80,7 +80,7 @@ def test_a_ring_of_distances_is_enough_to_find_it():
 def test_scans_lie_on_what_is_there(monkeypatch: pytest.MonkeyPatch):
     """Pose, frame and mounting together: points are on the true surfaces, within noise."""
     seen: list[np.ndarray] = []
-    monkeypatch.setattr(Planner, "observe", lambda self, scan: seen.append(scan.points_enu_m))
+    monkeypatch.setattr(Planner, "observe", lambda self, scan, others: seen.append(scan.points_enu_m))
     alone = msgspec.structs.replace(INDOOR, vehicles=INDOOR.vehicles[:1], targets=INDOOR.targets[:1], allocation=None)
     system = WholeSystem(alone, seed=3)
     assert system.fly().success

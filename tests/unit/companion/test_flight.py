@@ -143,13 +143,14 @@ def test_blocked_ahead_it_plans_at_once_and_flies_on_while_it_could_still_stop()
 
 
 def test_blocked_ahead_without_an_answer_it_brakes_before_it_is_too_late():
-    rig = blocked_ahead(in_s=2.5)
-    speed_m_s = np.linalg.norm(rig.velocity_ned_m_s)
-    stops_s = speed_m_s / rig.planner.limits.acceleration_m_s2
-    rig.run(2.5 - stops_s - 0.3)
+    rig = blocked_ahead(in_s=1.8)
+    rig.run(0.2)
     assert rig.pilot.state is State.FLYING
-    rig.run(0.3)
+    rig.run(1.6, until=lambda: rig.pilot.state is State.HOLDING)
     assert (rig.pilot.state, rig.pilot.reason) == (State.HOLDING, Reason.NO_PATH)
+    speed_m_s = np.linalg.norm(rig.velocity_ned_m_s)
+    assert speed_m_s > 1.0
+    assert rig.planner.conflict_at_s - rig.now_s > speed_m_s / rig.planner.limits.acceleration_m_s2
     assert_smooth(rig.run(3.0))
 
 
