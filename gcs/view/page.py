@@ -13,6 +13,7 @@ from gcs.view.browser import Browser
 from gcs.view.browsers import Browsers
 from gcs.view.cameras import Cameras
 from gcs.view.colours import BRAND, TARGET, Tone
+from gcs.view.editing_panel import EditingPanel
 from gcs.view.motion_scene import MotionScene
 from gcs.view.overlay import Tag
 from gcs.view.panels import Panels, Press
@@ -20,14 +21,15 @@ from gcs.view.plan_scene import PlanScene
 from gcs.view.replay_panel import ReplayPanel
 from gcs.view.sightings import Sighting, sightings, vehicle_colours, vehicle_order
 from gcs.view.theme import DARK, LIGHT, Theme
-from gcs.view.vehicle_scene import least_span_px
-from gcs.view.world_scene import WorldScene, diagonal_m
+from gcs.view.vehicle_scene import MANY, least_span_px
+from gcs.view.world_scene import OnPick, WorldScene, diagonal_m
+from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
 
 TITLE = "End-cloud GCS"
-TELL_INTERVAL_S = 0.25
-"""Panels and signs change this often; what moves is updated at every call."""
+TELL_INTERVAL_S, TELL_OF_MANY_S = 0.25, 0.5
+"""Panels and signs change this often, those of large fleets less; what moves is updated at every call."""
 
 WATCHED_M = np.array([[-30.0, -30.0, 0.0], [30.0, 30.0, 15.0]])
 """What is framed where there is no mission, around where the first vehicle has its home."""
@@ -63,6 +65,8 @@ class Page:
         self._motion = MotionScene(server.scene, max(LEAST_TRAIL_SPACING_M, size_m * TRAIL_SPACING_SHARE))
         self._panels = Panels(server, desk, self._press, self._views())
         self._replay = ReplayPanel(server.gui, desk.player) if desk.player is not None else None
+        if self._world is not None and desk.mission is not None and desk.player is None:
+            self._editing = EditingPanel(server, desk.mission, self._show_draft)
         self._browsers = Browsers(server, self._greet)
         self._use(DARK)
 
@@ -76,7 +80,7 @@ class Page:
             self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
-                self._next_tell_s = now_s + TELL_INTERVAL_S
+                self._next_tell_s = now_s + (TELL_OF_MANY_S if len(self._seen) > MANY else TELL_INTERVAL_S)
                 self._desk.collect_texts()
                 self._show_plan()
                 self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
@@ -101,6 +105,12 @@ class Page:
             _draw_plain(self._server.scene, theme)
         self._motion.use(theme)
         self._browsers.use(theme)
+
+    def _show_draft(self, mission: Mission, on_pick: OnPick | None) -> None:
+        """Draw a mission that is being edited, or the one that was loaded again."""
+        assert self._world is not None
+        self._world.show(mission, on_pick)
+        self._targets_m = [np.array(target.position_m) for target in mission.targets]
 
     def _pick(self, sysid: int, joins: bool) -> None:
         """A vehicle was clicked; called in a thread of viser."""
