@@ -64,7 +64,9 @@ class PilotSettings:
     replan_age_s: float = 1.0
     """A committed trajectory is replaced when it is this old."""
     retry_s: float = 0.3
-    """Between a failed plan and the next attempt."""
+    """Between a failed plan and the next attempt ..."""
+    conflict_retry_s: float = 0.1
+    """... where the committed trajectory meets something."""
     planning_allowance_wall_s: float = 0.06
     """A plan begins this much in the future: search and thread switches fit in (wall clock)."""
     lateness_wall_s: float = 0.06
@@ -103,6 +105,10 @@ class CompanionSettings:
     sensor: SensorKind = SensorKind.LIDAR
     lidar_address: str = "127.0.0.1:56300"
     """HOST:PORT at which the lidar's packets come in."""
+    fleet_link: str = "udpout://127.0.0.1:14980"
+    """Where the other companions are reached."""
+    fleet_port: int = 14700
+    """Bound for a relay."""
     deadman_s: float = 0.5
     reserve: Reserve = field(default_factory=Reserve)
     search: SearchSettings = field(default_factory=SearchSettings)

@@ -12,10 +12,10 @@ from companion.planner.braking import brake_along
 from companion.planner.dominance import objective_weights
 from companion.planner.evaluation import HARD
 from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around
-from companion.planner.limits import Surroundings, flight_limits, surroundings
+from companion.planner.limits import Surroundings, flight_limits, free_space, surroundings
 from companion.planner.local_plan import Horizon, LocalPlanner
 from companion.planner.reference import LEG_SPEED, Way
-from companion.planner.safety import worst_lack
+from companion.planner.safety import first_lack
 from companion.planner.spline_shape import spline_shape
 from companion.planner.traffic import traffic
 from companion.sensing.scan import Scan
@@ -159,16 +159,32 @@ class Planner:
         return self._plan_along(request, guide, arc_m, around)
 
     def is_clear(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> bool:
-        """The rest of a trajectory keeps what the mission requires (the reserve is not asked for).
+        """The rest of a trajectory has no conflict."""
+        return self.conflict_s(trajectory, now_s, neighbours) == np.inf
+
+    def conflict_s(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> float:
+        """When the rest of a trajectory first breaks what the mission requires (the reserve is not asked for).
 
         It is judged against what is known, what was seen until now, movers as they are expected, and the neighbours'
         trajectories. May be asked in another thread than plans are made in.
+
+        Returns:
+            vehicle time [s]; infinite when it never does.
         """
         begin_s = max(now_s, trajectory.start_s)
         around = self._around(trajectory.at(begin_s).position_m, begin_s, neighbours)
         done = min(max(now_s - trajectory.start_s, 0.0), trajectory.duration_s) / trajectory.knot_interval_s
         control_m, knot_s = trajectory.control_points_m, trajectory.knot_interval_s
-        return worst_lack(control_m, knot_s, done, self._required, around) == 0.0
+        after_s, _ = first_lack(control_m, knot_s, done, self._required, around)
+        return begin_s + after_s
+
+    def may_rest(self, places_m: Array) -> npt.NDArray[np.bool_]:
+        """Which of (n, 3) places are clear enough to rest there, as far as is known and was seen."""
+        places_m, free_m = np.ascontiguousarray(places_m, dtype=float), np.empty(len(places_m))
+        free_space(places_m, 0.0, self.around._replace(field=self._map.view.field), free_m)
+        low_m, high_m = self.around.room_m
+        inside = np.all((places_m >= low_m) & (places_m <= high_m), axis=1)
+        return inside & (free_m >= self.limits.clearance_m)
 
     def _around(self, place_m: Array, begin_s: float, neighbours: tuple[Neighbour, ...]) -> Surroundings:
         """Everything around a vehicle that is at a place at a time."""

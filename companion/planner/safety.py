@@ -13,8 +13,10 @@ CHECKS_PER_SEGMENT = 6
 
 
 @compiled
-def worst_lack(control: Array, knot_s: float, from_segment: float, limits: FlightLimits, around: Surroundings) -> float:
-    """The most that the rest of a trajectory lacks of all that is required [m]; 0 when it is safe.
+def first_lack(
+    control: Array, knot_s: float, from_segment: float, limits: FlightLimits, around: Surroundings
+) -> tuple[float, float]:
+    """When the rest of a trajectory first lacks something that is required, and how much it lacks at most.
 
     Args:
         control: (n, 3) control points, ENU [m].
@@ -22,6 +24,9 @@ def worst_lack(control: Array, knot_s: float, from_segment: float, limits: Fligh
         from_segment: where on it the vehicle is, counted in segments.
         limits: what is required.
         around: everything known, what moves from that moment on.
+
+    Returns:
+        time from that moment on [s], infinite when it is safe; metres, 0 when it is safe.
     """
     left = len(control) - 3 - from_segment
     steps = max(int(np.ceil(left * CHECKS_PER_SEGMENT)), 1)
@@ -31,7 +36,9 @@ def worst_lack(control: Array, knot_s: float, from_segment: float, limits: Fligh
     step_s = knot_s * left / steps
     free_space(points, step_s, around, free_m)
     lacking(points, free_m, step_s, around, ends_of(points[0], control[-1], around, limits), limits, lacking_m)
-    worst_m = 0.0
+    first_s, worst_m = np.inf, 0.0
     for i in range(steps + 1):
+        if lacking_m[i] > 0.0:
+            first_s = min(first_s, i * step_s)
         worst_m = max(worst_m, lacking_m[i])
-    return worst_m
+    return first_s, worst_m

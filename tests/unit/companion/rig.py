@@ -46,8 +46,8 @@ class StraightPlanner:
     def lay_guide(self, track: Track, index: int, from_m: np.ndarray) -> Guide:
         return lay_guide(track, index, from_m, INDOOR.onboard.horizon_m, self.limits)
 
-    def is_clear(self, trajectory: Trajectory, now_s: float) -> bool:
-        return self.clear
+    def conflict_s(self, trajectory: Trajectory, now_s: float) -> float:
+        return np.inf if self.clear else now_s
 
     def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
         return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)
