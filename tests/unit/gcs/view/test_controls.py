@@ -12,6 +12,7 @@ from gcs.view.server import close_server, open_server
 from missions.editing import Kind, Part, moved, place_m
 from missions.mission import Mission, load_mission
 from tests.browser.loopback import HOST, free_port
+from tests.browser.toy_player import ToyPlayer
 
 TARGET = Part(Kind.TARGET, "north-east")
 
@@ -67,27 +68,6 @@ async def test_new_bodies_are_drawn_and_picked(shown: Editing, kind: Kind):
     shown.panel.add(kind)
     assert shown.drawn == shown.panel.draft != before
     assert shown.gizmo_m is not None
-
-
-class ToyPlayer:
-    """Remembers what was asked of it."""
-
-    def __init__(self) -> None:
-        self.speed, self.duration_s, self.position_s, self.playing = 1.0, 60.0, 0.0, False
-        self.sought: list[float] = []
-
-    def play(self) -> None:
-        self.playing = True
-
-    def pause(self) -> None:
-        self.playing = False
-
-    def set_speed(self, speed: float) -> None:
-        self.speed = speed
-
-    def seek(self, position_s: float) -> None:
-        self.sought.append(position_s)
-        self.position_s = position_s
 
 
 async def test_the_timeline_follows_the_recording_and_many_moves_are_one_jump(server: viser.ViserServer):
