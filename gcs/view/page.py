@@ -33,6 +33,8 @@ TELL_INTERVAL_S, TELL_OF_MANY_S = 0.25, 0.5
 
 WATCHED_M = np.array([[-30.0, -30.0, 0.0], [30.0, 30.0, 15.0]])
 """What is framed where there is no mission, around where the first vehicle has its home."""
+AROUND_M = np.array([10.0, 10.0, 3.0])
+"""How much around the vehicles of a fleet without a mission is framed."""
 TARGET_PX = 14.0
 VEHICLE_FLATNESS = 0.6
 """A quadrotor is less high than wide in a picture from above."""
@@ -75,7 +77,10 @@ class Page:
         if self._replay is not None:
             self._replay.update()
         shown_s = self._desk.station.now_s
+        fleet_before = len(self._seen)
         self._seen = sightings(self._desk)
+        if len(self._seen) > fleet_before:
+            self._frame_fleet()
         with self._server.atomic():
             self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
@@ -155,8 +160,8 @@ class Page:
 
     def _views(self) -> dict[str, tuple[viser.IconName, Press]]:
         return {
-            "Overview": (viser.Icon.CUBE, self._view(self._cameras.overview)),
-            "Top": (viser.Icon.MAP_2, self._view(self._cameras.from_above)),
+            "Overview": (viser.Icon.CUBE, self._view(self._overview)),
+            "Top": (viser.Icon.MAP_2, self._view(self._from_above)),
             "Follow": (viser.Icon.FOCUS_2, self._view(self._follow)),
             "Light": (viser.Icon.SUN, self._view(lambda _: self._use(LIGHT))),
             "Dark": (viser.Icon.MOON, self._view(lambda _: self._use(DARK))),
@@ -169,6 +174,20 @@ class Page:
                 self._loop.call_soon_threadsafe(act, client)
 
         return press
+
+    def _overview(self, client: viser.ClientHandle) -> None:
+        self._frame_fleet()
+        self._cameras.overview(client)
+
+    def _from_above(self, client: viser.ClientHandle) -> None:
+        self._frame_fleet()
+        self._cameras.from_above(client)
+
+    def _frame_fleet(self) -> None:
+        """Without a mission, what is framed is where the vehicles are."""
+        if self._world is None and self._seen:
+            places_m = np.array([sighting.position_m for sighting in self._seen])
+            self._cameras.frame(places_m.min(axis=0) - AROUND_M, places_m.max(axis=0) + AROUND_M)
 
     def _follow(self, client: viser.ClientHandle) -> None:
         """Follow the selected vehicle, or the first one."""
