@@ -12,11 +12,10 @@ from playwright.async_api import async_playwright
 
 from gcs.view.page import Page
 from gcs.view.server import UPDATE_INTERVAL_S, close_server, open_server
-from tests.benchmarks.view.circling_fleet import circling, flown_before
+from tests.benchmarks.view.circling_fleet import CirclingFleet
 from tests.browser.chromium import ARGUMENTS, find_chromium
 from tests.browser.loopback import HOST, free_port
 from tests.browser.raw_client import RawClient, raw_client
-from tests.browser.scripted_desk import ScriptedDesk
 
 Array = npt.NDArray[np.float64]
 
@@ -50,12 +49,12 @@ class Load:
 
 
 @asynccontextmanager
-async def kept_page(scripted: ScriptedDesk) -> AsyncIterator[Kept]:
+async def kept_page(fleet: CirclingFleet) -> AsyncIterator[Kept]:
     """A page whose vehicles fly on at real time."""
     kept = Kept(free_port())
     server = open_server(HOST, kept.port)
-    page = Page(server, scripted.desk)
-    keeping = asyncio.create_task(_keep(page, scripted, kept))
+    page = Page(server, fleet.desk)
+    keeping = asyncio.create_task(_keep(page, fleet, kept))
     try:
         yield kept
         assert not keeping.done(), "the page has ended by itself"
@@ -68,7 +67,7 @@ async def kept_page(scripted: ScriptedDesk) -> AsyncIterator[Kept]:
 async def load(count: int, seconds: float, *, fast: int, slow: int) -> Load:
     """Keep a page of so many vehicles up to date for so long, watched by fast and slow connections."""
     async with AsyncExitStack() as stack:
-        kept = await stack.enter_async_context(kept_page(circling(count)))
+        kept = await stack.enter_async_context(kept_page(CirclingFleet(count)))
         readers = [await stack.enter_async_context(raw_client(kept.port)) for _ in range(fast)]
         laggards = [await stack.enter_async_context(raw_client(kept.port, SLOW_BYTES_PER_S)) for _ in range(slow)]
         await asyncio.sleep(WARM_UP_S)
@@ -88,9 +87,9 @@ async def load(count: int, seconds: float, *, fast: int, slow: int) -> Load:
 
 async def reloads_s(count: int, flown_s: float, times: int) -> list[float]:
     """From opening a tab to panels, tags and vehicles in it [s], in a flight that has lasted `flown_s` already."""
-    scripted, found = circling(count), []
-    flown_before(scripted, flown_s, 0.2)
-    async with kept_page(scripted) as kept, async_playwright() as playwright:
+    fleet, found = CirclingFleet(count), []
+    fleet.have_flown(flown_s, 0.2)
+    async with kept_page(fleet) as kept, async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=find_chromium(), args=ARGUMENTS)
         try:
             for _ in range(times + 1):
@@ -110,15 +109,13 @@ def _rate(client: RawClient, before: int, lasted_s: float) -> float:
     return (client.received - before) / lasted_s
 
 
-async def _keep(page: Page, scripted: ScriptedDesk, kept: Kept) -> None:
+async def _keep(page: Page, fleet: CirclingFleet, kept: Kept) -> None:
     clock = asyncio.get_running_loop().time
     due_s = clock()
     while True:
         kept.late_ms.append((clock() - due_s) * 1e3)
-        for vehicle in scripted.vehicles:
-            vehicle.fly_on(UPDATE_INTERVAL_S)
-        scripted.say()
-        scripted.sample()
+        fleet.fly_on(UPDATE_INTERVAL_S)
+        fleet.sample()
         begun_s = time.thread_time()
         page.update(clock())
         kept.cpu_ms.append((time.thread_time() - begun_s) * 1e3)
