@@ -13,7 +13,7 @@ from tests.browser.conftest import OpenPage, serving, tab
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
 from tests.browser.toy_player import ToyPlayer
-from tests.browser.watching import OUT, button, camera_position_m, scene, until
+from tests.browser.watching import OUT, button, camera_position_m, shows, until
 
 pytestmark = pytest.mark.browser
 
@@ -25,7 +25,8 @@ async def test_two_browsers_have_a_camera_each_and_share_everything_else(browser
         for page in (one, other):
             await expect(page.locator(".gcs-overlay .tag.vehicle")).to_have_count(2)
             await expect(page.locator(".gcs-overlay .tag", has_text="alpha")).to_contain_text("Offboard · 96 %")
-            assert {"/fleet/hull", "/fleet/tails", "/world/fence"} <= await scene(page)
+            for node in ("/fleet/hull", "/fleet/tails", "/world/fence"):
+                await shows(page, node)
         before_m = await camera_position_m(other)
         await button(one, "Top").click()
         await one.wait_for_timeout(1500)
@@ -42,7 +43,8 @@ async def test_a_mission_is_edited_in_the_scene_and_saved_as_a_file_that_loads(o
     await page.get_by_text("Edit mission").click()
     await button(page, "Cylinder").click()
     await expect(page.locator(".gcs-editing")).to_contain_text("changed")
-    assert {"/world/cylinder 1", "/editing/gizmo"} <= await scene(page)
+    await shows(page, "/world/cylinder 1")
+    await shows(page, "/editing/gizmo")
     async with page.expect_download() as downloading:
         await button(page, "Save").click()
     saved = tmp_path / "saved.yaml"
@@ -51,7 +53,7 @@ async def test_a_mission_is_edited_in_the_scene_and_saved_as_a_file_that_loads(o
     assert [cylinder.name for cylinder in mission.world.cylinders] == ["column", "cylinder 1"]
     await button(page, "Undo").click()
     await expect(page.locator(".gcs-editing")).to_contain_text("as it was loaded")
-    assert "/world/cylinder 1" not in await scene(page)
+    await shows(page, "/world/cylinder 1", there=False)
 
 
 async def test_a_recording_is_played_and_moved_through(open_page: OpenPage):
