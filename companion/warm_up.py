@@ -13,6 +13,7 @@ def warm_up(planner: Planner, mission: Mission, vehicle: Vehicle) -> None:
     """Plan once from the vehicle's start to the first target, replan, brake, and look for a way around."""
     start_m, target_m = mission.start_m(vehicle), np.array(mission.targets[0].position_m)
     guide = planner.lay_guide(Track(np.array([target_m]), np.array([np.nan])), 0, start_m)
+    planner.may_rest(start_m[None])
     at_rest = Motion(start_m, np.zeros(3), np.zeros(3))
     way_around(start_m, target_m, 0.0, planner.horizon_m, planner.limits, planner.around)
     plan = planner.plan(PlanRequest(0, at_rest, 0.0, guide, 0.0))

@@ -28,7 +28,7 @@ from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere
 from gcs.station import Station
-from missions import lidar_packets
+from missions import lidar_packets, ports
 from missions.errors import MissionError
 from missions.faults import format_fault
 from missions.mission import Mission, SensorKind
@@ -210,7 +210,7 @@ class FlightApp:
             options = ["--vehicle", str(vehicle.sysid), "--mission", self.settings.mission]
             options += ["--mode", self.settings.mode.value, "--seed", str(self.settings.seed)]
             options += ["--log", str(self.work_dir / f"{name}.jsonl")]
-            options += self._sensor_options(vehicle.sysid)
+            options += self._sensor_options(vehicle.sysid) + self._fleet_options()
             for fault in self.settings.faults:
                 if fault.vehicle == vehicle.sysid:
                     options += ["--fault", format_fault(fault)]
@@ -224,12 +224,19 @@ class FlightApp:
         address = ["--lidar", f"{settings.lidar_host}:{port}"] if settings.sensor is SensorKind.LIDAR else []
         return ["--sensor", settings.sensor.value, *address]
 
+    def _fleet_options(self) -> list[str]:
+        """How companions of this machine hear each other where no simulator passes their words on."""
+        if self.settings.autopilots is Autopilots.SIMULATED:
+            return []
+        port = ports.FIRST_FLEET_PORT + self.settings.instance_base
+        return ["--fleet-link", f"mcast://{ports.FLEET_GROUP}:{port}/127.0.0.1"]
+
     def _common_options(self) -> list[str]:
         origin = self.flight.mission.origin
         place = f"{origin.latitude_deg!r},{origin.longitude_deg!r},{origin.altitude_amsl_m!r}"
         settings = self.settings
-        ports = ["--speed", f"{settings.speed:g}", "--instance-base", str(settings.instance_base)]
-        return [*ports, "--origin", place, "--supervised"]
+        shared = ["--speed", f"{settings.speed:g}", "--instance-base", str(settings.instance_base)]
+        return [*shared, "--origin", place, "--supervised"]
 
     async def _settle_origin(self) -> None:
         """With `--origin here`, move the mission to where its first vehicle stands."""

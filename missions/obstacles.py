@@ -68,8 +68,7 @@ def terrain_height(points_enu_m: Array, obstacles: Obstacles) -> Array:
 @compiled
 def _clearance_of_points(points_enu_m: Array, obstacles: Obstacles) -> Array:
     out = np.empty(len(points_enu_m))
-    for i in range(len(points_enu_m)):
-        out[i] = clearance_at(points_enu_m[i, 0], points_enu_m[i, 1], points_enu_m[i, 2], obstacles)
+    fill_clearance(points_enu_m, obstacles, out)
     return out
 
 
@@ -82,19 +81,33 @@ def _terrain_below_points(points_enu_m: Array, obstacles: Obstacles) -> Array:
 
 
 @compiled
+def fill_clearance(points_enu_m: Array, obstacles: Obstacles, out: Array) -> None:
+    """Write `clearance` of (n, 3 or more) points into `out` (n,); further columns are not read.
+
+    The arrays are taken out of `obstacles` once: doing so for every point would cost more than the distances.
+    """
+    boxes, cylinders, threats, peaks = obstacles.boxes, obstacles.cylinders, obstacles.threats, obstacles.peaks
+    for i in range(len(points_enu_m)):
+        east, north, up = points_enu_m[i, 0], points_enu_m[i, 1], points_enu_m[i, 2]
+        out[i] = nearest_of(east, north, up, boxes, cylinders, threats, peaks)
+
+
+@compiled
 def clearance_at(east: float, north: float, up: float, obstacles: Obstacles) -> float:
     """`clearance` of one point, to be called from compiled code."""
+    return nearest_of(east, north, up, obstacles.boxes, obstacles.cylinders, obstacles.threats, obstacles.peaks)
+
+
+@compiled
+def nearest_of(
+    east: float, north: float, up: float, boxes: Array, cylinders: Array, threats: Array, peaks: Array
+) -> float:
+    """`clearance` of one point to what stands in the arrays of `Obstacles`."""
     nearest = FAR_M
-    boxes, cylinders, threats, peaks = (
-        obstacles.boxes,
-        obstacles.cylinders,
-        obstacles.threats,
-        obstacles.peaks,
-    )
     for i in range(len(boxes)):
-        nearest = min(nearest, _to_box(east, north, up, boxes[i]))
+        nearest = min(nearest, _to_box(east, north, up, boxes, i))
     for i in range(len(cylinders)):
-        nearest = min(nearest, _to_cylinder(east, north, up, cylinders[i]))
+        nearest = min(nearest, _to_cylinder(east, north, up, cylinders, i))
     for i in range(len(threats)):
         de, dn = east - threats[i, 0], north - threats[i, 1]
         nearest = min(nearest, np.sqrt(de * de + dn * dn + up * up) - threats[i, 2])  # eq. 22
@@ -115,18 +128,19 @@ def terrain_height_at(east: float, north: float, obstacles: Obstacles) -> float:
 
 
 @compiled
-def _to_box(east: float, north: float, up: float, box: Array) -> float:
-    de, dn, du = abs(east - box[0]) - box[3], abs(north - box[1]) - box[4], abs(up - box[2]) - box[5]
+def _to_box(east: float, north: float, up: float, boxes: Array, i: int) -> float:
+    de, dn = abs(east - boxes[i, 0]) - boxes[i, 3], abs(north - boxes[i, 1]) - boxes[i, 4]
+    du = abs(up - boxes[i, 2]) - boxes[i, 5]
     inside = min(max(de, max(dn, du)), 0.0)
     de, dn, du = max(de, 0.0), max(dn, 0.0), max(du, 0.0)
     return np.sqrt(de * de + dn * dn + du * du) + inside
 
 
 @compiled
-def _to_cylinder(east: float, north: float, up: float, cylinder: Array) -> float:
-    de, dn = east - cylinder[0], north - cylinder[1]
-    radial = np.sqrt(de * de + dn * dn) - cylinder[2]
-    axial = max(cylinder[3] - up, up - cylinder[4])
+def _to_cylinder(east: float, north: float, up: float, cylinders: Array, i: int) -> float:
+    de, dn = east - cylinders[i, 0], north - cylinders[i, 1]
+    radial = np.sqrt(de * de + dn * dn) - cylinders[i, 2]
+    axial = max(cylinders[i, 3] - up, up - cylinders[i, 4])
     inside = min(max(radial, axial), 0.0)
     radial, axial = max(radial, 0.0), max(axial, 0.0)
     return np.sqrt(radial * radial + axial * axial) + inside

@@ -57,24 +57,41 @@ def templates(reach_nodes: int) -> Bytes:
 @compiled
 def distance_at(east: float, north: float, up: float, field: Field) -> float:
     """Distance [m] at a place, between the nodes linearly; `FAR_M` beyond the field's reach and outside of it."""
-    values, low_m, spacing_m = field.values, field.low_m, field.spacing_m
+    low_m, spacing_m = field.low_m, field.spacing_m
     x, y, z = (east - low_m[0]) / spacing_m, (north - low_m[1]) / spacing_m, (up - low_m[2]) / spacing_m
+    return interpolated(x, y, z, field.values, field.step_m)
+
+
+@compiled
+def lower_to_field(points_m: Array, field: Field, out: Array) -> None:
+    """Lower `out` (m,) to the distances [m] at (m, 3 or more) points; further columns are not read."""
+    values, low_m, spacing_m, step_m = field.values, field.low_m, field.spacing_m, field.step_m
+    if len(values) == 0:
+        return
+    east, north, up, per_m = low_m[0], low_m[1], low_m[2], 1.0 / spacing_m
+    for i in range(len(points_m)):
+        x, y, z = (points_m[i, 0] - east) * per_m, (points_m[i, 1] - north) * per_m, (points_m[i, 2] - up) * per_m
+        out[i] = min(out[i], interpolated(x, y, z, values, step_m))
+
+
+@compiled
+def interpolated(x: float, y: float, z: float, values: Bytes, step_m: float) -> float:
+    """`distance_at` in units of the nodes' spacing."""
     if not (x >= 0.0 and y >= 0.0 and z >= 0.0):
         return FAR_M
-    i, j, k = np.uint64(x), np.uint64(y), np.uint64(z)
-    one = np.uint64(1)
-    if i + one >= values.shape[0] or j + one >= values.shape[1] or k + one >= values.shape[2]:
+    i, j, k = int(x), int(y), int(z)
+    if i + 1 >= values.shape[0] or j + 1 >= values.shape[1] or k + 1 >= values.shape[2]:
         return FAR_M
-    a, b = np.int64(values[i, j, k]), np.int64(values[i, j, k + one])
-    c, d = np.int64(values[i, j + one, k]), np.int64(values[i, j + one, k + one])
-    e, f = np.int64(values[i + one, j, k]), np.int64(values[i + one, j, k + one])
-    g, h = np.int64(values[i + one, j + one, k]), np.int64(values[i + one, j + one, k + one])
+    a, b = np.int64(values[i, j, k]), np.int64(values[i, j, k + 1])
+    c, d = np.int64(values[i, j + 1, k]), np.int64(values[i, j + 1, k + 1])
+    e, f = np.int64(values[i + 1, j, k]), np.int64(values[i + 1, j, k + 1])
+    g, h = np.int64(values[i + 1, j + 1, k]), np.int64(values[i + 1, j + 1, k + 1])
     if a + b + c + d + e + f + g + h == 8 * SATURATED:
         return FAR_M
     p, q, r = x - i, y - j, z - k
     near = (a + (b - a) * r) * (1.0 - q) + (c + (d - c) * r) * q
     far = (e + (f - e) * r) * (1.0 - q) + (g + (h - g) * r) * q
-    return (near + (far - near) * p) * field.step_m
+    return (near + (far - near) * p) * step_m
 
 
 @compiled

@@ -41,6 +41,7 @@ class Archive(NamedTuple):
     n: npt.NDArray[np.int64]
 
 
+@compiled
 def new_archive(capacity: int, dimensions: int) -> Archive:
     """An empty archive for candidates of `dimensions` numbers."""
     return Archive(np.zeros((capacity, dimensions)), np.zeros((capacity, MARK + 1)), np.zeros(1, np.int64))

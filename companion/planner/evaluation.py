@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from companion.planner.limits import FlightLimits, Surroundings, free_space, lacking, span, speed_limit
+from companion.planner.limits import FlightLimits, Surroundings, free_space, lacking, span
 from companion.planner.reference import SPEED_CAP, TANGENT, WIDTH, Reference, apart
 from missions.kernels import compiled
 
@@ -140,18 +140,24 @@ def judge_motion(
     Who starts too fast, or accelerating too hard, is given the time that it takes to come back to the limits.
     """
     n, step_s = len(motion), duration_s / (len(motion) - 1)
+    avoidance_m_s, cruise_m_s = limits.avoidance_m_s, limits.cruise_m_s
+    avoidance_distance_m, braking_m_s2 = limits.avoidance_distance_m, limits.braking_m_s2
+    acceleration_m_s2, jerk_m_s3 = limits.acceleration_m_s2, limits.jerk_m_s3
+    climbs_m_s, turns = CLIMB_SLACK_M_S, limits.turn_radius_m > 0.0
     first_m_s, first_m_s2 = span(start[1, 0], start[1, 1], start[1, 2]), span(start[2, 0], start[2, 1], start[2, 2])
     for k in range(1, n):
         v2 = motion[k, 3] ** 2 + motion[k, 4] ** 2 + motion[k, 5] ** 2
         a2 = motion[k, 6] ** 2 + motion[k, 7] ** 2 + motion[k, 8] ** 2
-        allowed_m_s = min(speed_limit(free_m[k], limits), reference[k, SPEED_CAP])
-        allowed_m_s = max(allowed_m_s, first_m_s - limits.braking_m_s2 * k * step_s)
-        allowed_m_s2 = max(limits.acceleration_m_s2, first_m_s2 - limits.jerk_m_s3 * k * step_s)
+        allowed_m_s = avoidance_m_s if free_m[k] < avoidance_distance_m else cruise_m_s
+        allowed_m_s = min(allowed_m_s, reference[k, SPEED_CAP])
+        allowed_m_s = max(allowed_m_s, first_m_s - braking_m_s2 * k * step_s)
+        allowed_m_s2 = max(acceleration_m_s2, first_m_s2 - jerk_m_s3 * k * step_s)
         if v2 > allowed_m_s * allowed_m_s:
             value[HARD] += np.sqrt(v2) / allowed_m_s - 1.0
         if a2 > allowed_m_s2 * allowed_m_s2:
             value[HARD] += np.sqrt(a2) / allowed_m_s2 - 1.0
-        value[SOFT] += _turn_and_climb(motion, k, v2, a2, limits)
+        if climbs_m_s * climbs_m_s < motion[k, 5] * motion[k, 5] or turns:
+            value[SOFT] += _turn_and_climb(motion, k, v2, a2, limits)
 
 
 @compiled

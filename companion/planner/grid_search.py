@@ -1,10 +1,11 @@
 """A way around what blocks the guide: A* on a grid, then straightened. Asked only when the guide itself is blocked.
 
-The cost of a way is its time at the speeds that the mission's rule allows: obstacles are passed slowly or far off.
+The cost of a way is its time at the speeds that the mission's rule allows: obstacles are passed slowly or far off. A
+cell is looked at when the search comes to it, not before.
 """
 
 import heapq
-import itertools
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +15,16 @@ from missions.kernels import compiled
 
 Array = npt.NDArray[np.float64]
 
-MAX_CELLS = 150_000
+MAX_CELLS = 60_000
 CELL_MARGIN = 0.25
 """Cells need so much more clearance, as a share of their size: the way between two cells is clear as well."""
-PROBES_PER_CELL = 4.0
+PROBES_PER_CELL = 3.0
 """How densely a straight line is looked at."""
 BLOCKED = 0.0
+UNSEEN = -1.0
+"""Speed of a cell that the search has not come to yet."""
+GREED = 1.15
+"""The estimate of the rest of a way is taken by so much too seriously: far fewer cells, hardly longer ways."""
 
 
 def way_around(
@@ -38,76 +43,132 @@ def way_around(
     Returns:
         (m, 3) corners from start to goal; (0, 3) when there is no way.
     """
+    start_m, goal_m = np.asarray(start_m, dtype=float), np.asarray(goal_m, dtype=float)
+    return find_way(start_m, goal_m, room_m, cell_m, limits, around)
+
+
+@compiled
+def find_way(
+    start_m: Array, goal_m: Array, room_m: float, cell_m: float, limits: FlightLimits, around: Surroundings
+) -> Array:
+    """`way_around`, compiled."""
     low = np.maximum(np.minimum(start_m, goal_m) - room_m, around.room_m[0])
     high = np.minimum(np.maximum(start_m, goal_m) + room_m, around.room_m[1])
-    cell_m = max(cell_m, float(np.prod(np.maximum(high - low, cell_m)) / MAX_CELLS) ** (1.0 / 3.0))
-    shape = np.maximum(np.floor((high - low) / cell_m).astype(np.int64), 0) + 1
-    places = np.stack(np.meshgrid(*(np.arange(n) for n in shape), indexing="ij"), axis=-1).reshape(-1, 3)
-    places = np.ascontiguousarray(low + cell_m * places)
-    ends = ends_of(np.asarray(start_m, dtype=float), np.asarray(goal_m, dtype=float), around, limits)
-    speeds = speeds_at(places, CELL_MARGIN * cell_m, limits, around, ends)
-    first, last = (_cell_of(end[:3], low, cell_m, shape) for end in ends)
-    parents = astar(speeds, shape, cell_m, first, last, limits.avoidance_m_s, limits.cruise_m_s, _climb_sine(limits))
-    cells = _trace(parents, first, last)
-    if not cells:
+    volume = 1.0
+    for axis in range(3):
+        volume *= max(high[axis] - low[axis], cell_m)
+    cell_m = max(cell_m, (volume / MAX_CELLS) ** (1.0 / 3.0))
+    shape, first, last = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
+    for axis in range(3):
+        shape[axis] = max(int(np.floor((high[axis] - low[axis]) / cell_m)), 0) + 1
+        first[axis] = min(max(int(np.rint((start_m[axis] - low[axis]) / cell_m)), 0), shape[axis] - 1)
+        last[axis] = min(max(int(np.rint((goal_m[axis] - low[axis]) / cell_m)), 0), shape[axis] - 1)
+    ends = ends_of(start_m, goal_m, around, limits)
+    cells = astar(low, shape, cell_m, first, last, limits, around, ends)
+    if len(cells) == 0:
         return np.empty((0, 3))
-    path = np.vstack((start_m, places[cells[1:-1]], goal_m))
+    path = np.empty((max(len(cells), 2), 3))
+    for i in range(1, len(cells) - 1):
+        path[i, 0] = low[0] + cell_m * (cells[i] // (shape[1] * shape[2]))
+        path[i, 1] = low[1] + cell_m * (cells[i] // shape[2] % shape[1])
+        path[i, 2] = low[2] + cell_m * (cells[i] % shape[2])
+    path[0], path[len(path) - 1] = start_m, goal_m
     return straighten(path, cell_m, limits, around, ends)
-
-
-def speeds_at(points_m: Array, margin_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> Array:
-    """(m,) speeds [m/s] that are allowed at (m, 3) points; BLOCKED where clearance (less a margin) or height lacks."""
-    free_m, lacking_m = np.empty(len(points_m)), np.empty(len(points_m))
-    free_space(points_m, 0.0, around, free_m)
-    lacking(points_m, free_m - margin_m, 0.0, around, ends, limits, lacking_m)
-    slow = free_m < limits.avoidance_distance_m
-    return np.where(lacking_m > 0.0, BLOCKED, np.where(slow, limits.avoidance_m_s, limits.cruise_m_s))
 
 
 @compiled
 def astar(
-    speeds_m_s: Array,
+    low: Array,
     shape: npt.NDArray[np.int64],
     cell_m: float,
-    first: int,
-    last: int,
-    slow_m_s: float,
-    fast_m_s: float,
-    climb_sine: float,
+    first: npt.NDArray[np.int64],
+    last: npt.NDArray[np.int64],
+    limits: FlightLimits,
+    around: Surroundings,
+    ends: Array,
 ) -> npt.NDArray[np.int64]:
-    """For each cell of a grid (flattened) the one before it on the quickest way from `first`; -1 where not reached.
+    """(m,) cells of the quickest way between two, both included; (0,) when there is none.
 
-    The first and the last cell may be blocked: they are then passed at `slow_m_s`.
+    Args:
+        low: (3,) place of the first cell, ENU [m].
+        shape: (3,) number of cells.
+        cell_m: size of a cell.
+        first: (3,) where the way begins; it may be blocked itself.
+        last: (3,) where it ends; likewise.
+        limits, around, ends: see `lacking`.
     """
-    cost = np.full(len(speeds_m_s), np.inf)
-    parents = np.full(len(speeds_m_s), -1, np.int64)
-    cost[first] = 0.0
-    queue = [(0.0, first)]
     n_north, n_up = shape[1], shape[2]
-    east_last, north_last, up_last = last // (n_north * n_up), last // n_up % n_north, last % n_up
+    begin, end = (first[0] * n_north + first[1]) * n_up + first[2], (last[0] * n_north + last[1]) * n_up + last[2]
+    n = shape[0] * n_north * n_up
+    speeds, cost, parents = np.full(n, UNSEEN), np.full(n, np.inf), np.full(n, -1, np.int64)
+    probe, climb_sine, fast_m_s = Probe(np.empty((1, 3)), np.empty(1), np.empty(1)), sine_of(limits), limits.cruise_m_s
+    cost[begin] = 0.0
+    queue: list[tuple[float, int]] = [(0.0, int(begin))]
     while len(queue) > 0:
         estimate, cell = heapq.heappop(queue)
         east, north, up = cell // (n_north * n_up), cell // n_up % n_north, cell % n_up
-        ahead = span(east_last - east, north_last - north, up_last - up) * cell_m / fast_m_s
-        if cell == last:
+        ahead = GREED * span(last[0] - east, last[1] - north, last[2] - up) * cell_m / fast_m_s
+        if cell == end:
             break
         if estimate > cost[cell] + ahead + 1e-9:
             continue  # an older entry of the queue: a quicker way was found since
         for step in range(27):
             de, dn, du = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
-            e, n, u = east + de, north + dn, up + du
-            if e < 0 or n < 0 or u < 0 or e >= shape[0] or n >= n_north or u >= n_up:
+            e, n_, u = east + de, north + dn, up + du
+            if e < 0 or n_ < 0 or u < 0 or e >= shape[0] or n_ >= n_north or u >= n_up:
                 continue
-            other = (e * n_north + n) * n_up + u
-            if speeds_m_s[other] == BLOCKED and other != last:
+            other = (e * n_north + n_) * n_up + u
+            if speeds[other] == UNSEEN:
+                probe.place_m[0, 0], probe.place_m[0, 1] = low[0] + cell_m * e, low[1] + cell_m * n_
+                probe.place_m[0, 2] = low[2] + cell_m * u
+                speeds[other] = speed_at(probe, CELL_MARGIN * cell_m, limits, around, ends)
+            if speeds[other] == BLOCKED and other != end:
                 continue
             length_m = climbed(span(de, dn, du), du, climb_sine) * cell_m
-            reached = cost[cell] + length_m / max(speeds_m_s[other], slow_m_s)
+            reached = cost[cell] + length_m / max(speeds[other], limits.avoidance_m_s)
             if reached < cost[other]:
                 cost[other], parents[other] = reached, cell
-                left = span(east_last - e, north_last - n, up_last - u) * cell_m / fast_m_s
-                heapq.heappush(queue, (reached + left, other))
-    return parents
+                left = GREED * span(last[0] - e, last[1] - n_, last[2] - u) * cell_m / fast_m_s
+                heapq.heappush(queue, (float(reached + left), int(other)))
+    return _trace(parents, begin, end)
+
+
+class Probe(NamedTuple):
+    """Room to look at one place."""
+
+    place_m: Array
+    """(1, 3)."""
+    free_m: Array
+    """(1,)."""
+    lacking_m: Array
+    """(1,)."""
+
+
+@compiled
+def speed_at(probe: Probe, margin_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> float:
+    """The speed [m/s] that is allowed at the probe's place; BLOCKED where clearance (less a margin) or height lacks."""
+    free_space(probe.place_m, 0.0, around, probe.free_m)
+    slow = probe.free_m[0] < limits.avoidance_distance_m
+    probe.free_m[0] -= margin_m
+    lacking(probe.place_m, probe.free_m, 0.0, around, ends, limits, probe.lacking_m)
+    if probe.lacking_m[0] > 0.0:
+        return BLOCKED
+    return limits.avoidance_m_s if slow else limits.cruise_m_s
+
+
+@compiled
+def _trace(parents: npt.NDArray[np.int64], begin: int, end: int) -> npt.NDArray[np.int64]:
+    count, cell = 1, end
+    while cell != begin:
+        cell = parents[cell]
+        if cell < 0:
+            return np.empty(0, np.int64)
+        count += 1
+    cells, cell = np.empty(count, np.int64), end
+    for i in range(count - 1, -1, -1):
+        cells[i] = cell
+        cell = parents[cell]
+    return cells
 
 
 @compiled
@@ -116,44 +177,56 @@ def climbed(length_m: float, up_m: float, climb_sine: float) -> float:
     return max(length_m, abs(up_m) / climb_sine)
 
 
+@compiled
 def straighten(path: Array, cell_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> Array:
     """Leave out the corners of a (m, 3) path wherever the straight line is clear and no slower."""
-    times = np.concatenate(
-        ([0.0], np.cumsum([_time(a, b, cell_m, limits, around, ends) for a, b in itertools.pairwise(path)]))
-    )
-    kept = [0]
-    while kept[-1] < len(path) - 1:
-        i, j = kept[-1], len(path) - 1
-        while j > i + 1 and _time(path[i], path[j], cell_m, limits, around, ends) > times[j] - times[i] + 1e-9:
+    probe, m = Probe(np.empty((1, 3)), np.empty(1), np.empty(1)), len(path)
+    times = np.zeros(m)
+    for i in range(1, m):
+        times[i] = times[i - 1] + flown_s(path[i - 1], path[i], cell_m, limits, around, ends, probe, np.inf)
+    kept, count = np.zeros(m, np.int64), 1
+    while kept[count - 1] < m - 1:
+        i, j = kept[count - 1], m - 1
+        while j > i + 1:
+            most_s = times[j] - times[i] + 1e-9
+            if flown_s(path[i], path[j], cell_m, limits, around, ends, probe, most_s) <= most_s:
+                break
             j -= 1
-        kept.append(j)
-    return path[kept]
+        kept[count] = j
+        count += 1
+    return path[kept[:count]]
 
 
-def _time(a: Array, b: Array, cell_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> float:
-    """Time [s] along a straight line at the allowed speeds; a blocked line takes as long as no way around would."""
-    length_m = float(np.linalg.norm(b - a))
+@compiled
+def flown_s(
+    a: Array,
+    b: Array,
+    cell_m: float,
+    limits: FlightLimits,
+    around: Surroundings,
+    ends: Array,
+    probe: Probe,
+    most_s: float,
+) -> float:
+    """Time [s] along a straight line at the allowed speeds; where it is blocked, a thousand times the slowest.
+
+    It is not looked at any farther once it takes more than `most_s`.
+    """
+    length_m = span(b[0] - a[0], b[1] - a[1], b[2] - a[2])
     n = max(int(np.ceil(length_m / cell_m * PROBES_PER_CELL)), 1)
-    speeds = speeds_at(a + (b - a) * ((np.arange(n)[:, None] + 0.5) / n), 0.0, limits, around, ends)
-    flown_m = climbed(length_m, b[2] - a[2], _climb_sine(limits))
-    return float(np.sum(flown_m / n / np.where(speeds == BLOCKED, 1e-3 * limits.avoidance_m_s, speeds)))
+    part_m, total_s = climbed(length_m, b[2] - a[2], sine_of(limits)) / n, 0.0
+    for i in range(n):
+        share = (i + 0.5) / n
+        for axis in range(3):
+            probe.place_m[0, axis] = a[axis] + share * (b[axis] - a[axis])
+        speed_m_s = speed_at(probe, 0.0, limits, around, ends)
+        total_s += part_m / (speed_m_s if speed_m_s > BLOCKED else 1e-3 * limits.avoidance_m_s)
+        if total_s > most_s:
+            break
+    return total_s
 
 
-def _climb_sine(limits: FlightLimits) -> float:
-    return float(np.sin(np.arctan(limits.climb_tangent)))
-
-
-def _cell_of(point_m: Array, low: Array, cell_m: float, shape: npt.NDArray[np.int64]) -> int:
-    nearest = np.clip(np.rint((point_m - low) / cell_m).astype(int), 0, shape - 1)
-    return int(np.ravel_multi_index(tuple(nearest), tuple(shape)))
-
-
-def _trace(parents: npt.NDArray[np.int64], first: int, last: int) -> list[int]:
-    """Cells from the first to the last; empty when the last was not reached."""
-    cells = [last]
-    while cells[-1] != first:
-        before = int(parents[cells[-1]])
-        if before < 0:
-            return []
-        cells.append(before)
-    return cells[::-1]
+@compiled
+def sine_of(limits: FlightLimits) -> float:
+    """Of the steepest climb."""
+    return np.sin(np.arctan(limits.climb_tangent))

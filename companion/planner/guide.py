@@ -3,14 +3,16 @@
 A guide changes when a new track arrives and when it turns out to be blocked; replans only read it.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from companion.planner.grid_search import BLOCKED, speeds_at, way_around
+from companion.planner.grid_search import BLOCKED, Probe, speed_at, straighten, way_around
 from companion.planner.limits import FlightLimits, Surroundings, ends_of
 from companion.planner.reference import LEG_SPEED, Way
+from missions.kernels import compiled
 from missions.mission_items import Track
 from missions.time_law import arc_length, resample
 
@@ -93,36 +95,83 @@ def lay_guide(track: Track, index: int, from_m: Array, horizon_m: float, limits:
 
 
 def lead_around(
-    guide: Guide, around: Surroundings, limits: FlightLimits, horizon_m: float, cell_m: float
+    guide: Guide,
+    around: Surroundings,
+    limits: FlightLimits,
+    horizon_m: float,
+    cell_m: float,
+    from_m: float = 0.0,
+    place_m: Array | None = None,
 ) -> Guide | None:
-    """The guide with its blocked pieces replaced by ways around; None when there is no way."""
+    """The guide with its blocked pieces replaced by ways around; None when there is no way.
+
+    Args:
+        guide: what is followed.
+        around: what may block it.
+        limits: what is kept.
+        horizon_m: nearer than this a way around begins where the vehicle is.
+        cell_m: of the grid on which ways around are looked for.
+        from_m: how much of the guide is done [m].
+        place_m: (3,) where the vehicle is; without it, on the guide.
+    """
     for _ in range(MAX_DETOURS):
-        piece = first_blocked_piece(guide.way, around, limits)
+        piece = first_blocked_piece(guide.way, around, limits, from_m)
         if piece is None:
             return guide
-        detoured = _with_detour(guide, piece, around, limits, horizon_m, cell_m)
+        detoured = _with_detour(guide, piece, around, limits, horizon_m, cell_m, from_m, place_m)
         if detoured is None:
             return None
-        guide = detoured
+        guide, anew = detoured
+        if anew:
+            from_m, place_m = 0.0, None
     return None
 
 
-def first_blocked_piece(way: Way, around: Surroundings, limits: FlightLimits) -> tuple[int, int] | None:
+def first_blocked_piece(
+    way: Way, around: Surroundings, limits: FlightLimits, from_m: float = 0.0
+) -> tuple[int, int] | None:
     """(first, last) sample indices of the first piece of a way that lacks clearance or height; None when all is clear.
 
     Blocked samples so near to each other that their detours would meet are one piece.
     """
-    blocked = np.flatnonzero(blocked_samples(way.points_m, around, limits))
-    if len(blocked) == 0:
-        return None
-    apart = np.flatnonzero(np.diff(way.arc_m[blocked]) > 4.0 * _pull_m(limits))
-    return int(blocked[0]), int(blocked[apart[0] if len(apart) else -1])
+    first, last = find_blocked(way, from_m, 4.0 * _pull_m(limits), around, limits)
+    return None if first < 0 else (int(first), int(last))
+
+
+@compiled
+def find_blocked(way: Way, from_m: float, gap_m: float, around: Surroundings, limits: FlightLimits) -> tuple[int, int]:
+    """`first_blocked_piece` behind an arc, compiled: pieces less than `gap_m` apart are one; (-1, -1) without any."""
+    m, first, last = len(way.arc_m), -1, -1
+    begin = min(int(np.searchsorted(way.arc_m, from_m)), m - 1)
+    probe = Probe(np.empty((1, 3)), np.empty(1), np.empty(1))
+    ends = ends_of(way.samples[begin, :3], way.samples[m - 1, :3], around, limits)
+    for i in range(begin, m):
+        for axis in range(3):
+            probe.place_m[0, axis] = way.samples[i, axis]
+        if speed_at(probe, 0.0, limits, around, ends) == BLOCKED:
+            if first >= 0 and way.arc_m[i] - way.arc_m[last] > gap_m:
+                break
+            first, last = (i if first < 0 else first), i
+    return first, last
 
 
 def blocked_samples(points_m: Array, around: Surroundings, limits: FlightLimits) -> npt.NDArray[np.bool_]:
     """(m,) which of (m, 3) points lack clearance, height or flight range, eased near the first and the last one."""
+    points_m = np.ascontiguousarray(points_m)
     ends = ends_of(points_m[0].copy(), points_m[-1].copy(), around, limits)
-    return speeds_at(np.ascontiguousarray(points_m), 0.0, limits, around, ends) == BLOCKED
+    return mark_blocked(points_m, ends, around, limits)
+
+
+@compiled
+def mark_blocked(points_m: Array, ends: Array, around: Surroundings, limits: FlightLimits) -> npt.NDArray[np.bool_]:
+    """`blocked_samples`, compiled."""
+    out = np.empty(len(points_m), np.bool_)
+    probe = Probe(np.empty((1, 3)), np.empty(1), np.empty(1))
+    for i in range(len(points_m)):
+        for axis in range(3):
+            probe.place_m[0, axis] = points_m[i, axis]
+        out[i] = speed_at(probe, 0.0, limits, around, ends) == BLOCKED
+    return out
 
 
 def nearest_on(points_m: Array, arc_m: Array, point_m: Array) -> tuple[float, float]:
@@ -181,32 +230,97 @@ def corner_speeds(points_m: Array, arc_m: Array, reach_m: float, limits: FlightL
 
 
 def _with_detour(
-    guide: Guide, piece: tuple[int, int], around: Surroundings, limits: FlightLimits, horizon_m: float, cell_m: float
-) -> Guide | None:
-    """The guide with one blocked piece, and some of the way before and behind it, replaced."""
+    guide: Guide,
+    piece: tuple[int, int],
+    around: Surroundings,
+    limits: FlightLimits,
+    horizon_m: float,
+    cell_m: float,
+    from_m: float,
+    place_m: Array | None,
+) -> tuple[Guide, bool] | None:
+    """The guide with one blocked piece, and some of the way before and behind it, replaced.
+
+    A piece that is near is passed from where the vehicle is, and the guide begins there; then True.
+    """
     way = guide.way
     if piece[1] == len(way.arc_m) - 1:
         return None
-    a, b = _anchors(way, piece, around, limits)
-    room_m = max(float(np.linalg.norm(way.points_m[b] - way.points_m[a])), 4.0 * _pull_m(limits))
-    corners = way_around(way.points_m[a], way.points_m[b], room_m, cell_m, limits, around)
-    if len(corners) == 0:
-        return None
+    blocked = blocked_samples(way.points_m, around, limits)
+    near = way.arc_m[piece[0]] - from_m < horizon_m
+    a = max(int(np.searchsorted(way.arc_m, from_m, side="right")) - 1, 0) if near else _leave(way, piece, limits)
+    begin_m = place_m if near and place_m is not None else way.points_m[a]
+    for b in _rejoin(guide, piece, blocked, a, horizon_m, limits):
+        corners = _corners(begin_m, guide, b, limits, around, cell_m)
+        if len(corners):
+            detour = _detour(guide, a, b, corners, around, limits, horizon_m, cell_m)
+            return (_begun_anew(guide, a, *detour), True) if near else (_spliced(guide, a, *detour), False)
+    return None
+
+
+def _leave(way: Way, piece: tuple[int, int], limits: FlightLimits) -> int:
+    """Where to leave a way before a blocked piece that is far off."""
+    a = piece[0] - 1
+    while a > 0 and way.arc_m[piece[0]] - way.arc_m[a] < _pull_m(limits):
+        a -= 1
+    return max(a, 0)
+
+
+def _rejoin(
+    guide: Guide, piece: tuple[int, int], blocked: npt.NDArray[np.bool_], a: int, horizon_m: float, limits: FlightLimits
+) -> Iterator[int]:
+    """Samples at which a detour may come back: at the horizon, at the next track point, soon after the piece."""
+    arcs, nearest = guide.way.arc_m, piece[1] + 1
+    while nearest < len(arcs) - 1 and arcs[nearest] - arcs[piece[1]] < _pull_m(limits) and not blocked[nearest + 1]:
+        nearest += 1
+    next_point = _next_point(guide, nearest)
+    for index in range(int(np.searchsorted(arcs, arcs[a] + horizon_m)), next_point):
+        if index > nearest and not blocked[index]:
+            yield index
+            break
+    if next_point > nearest and arcs[next_point] - arcs[a] < 2.0 * horizon_m and not blocked[next_point]:
+        yield next_point
+    yield nearest
+
+
+def _next_point(guide: Guide, index: int) -> int:
+    """Sample of the first track point that is not before a sample."""
+    arcs = guide.way.arc_m
+    track = int(np.searchsorted(guide.track_arc_m, arcs[index] - MERGED_M))
+    arc_m = guide.track_arc_m[min(track, len(guide.track_arc_m) - 1)]
+    return min(int(np.searchsorted(arcs, arc_m - MERGED_M)), len(arcs) - 1)
+
+
+def _corners(begin_m: Array, guide: Guide, b: int, limits: FlightLimits, around: Surroundings, cell_m: float) -> Array:
+    """(m, 3) corners of a way to a sample of the guide; (0, 3) when there is none."""
+    end_m = guide.way.points_m[b].copy()
+    room_m = max(0.3 * float(np.linalg.norm(end_m - begin_m)), 4.0 * _pull_m(limits))
+    corners = way_around(begin_m, end_m, room_m, cell_m, limits, around)
+    return corners if len(corners) else way_around(begin_m, end_m, 3.0 * room_m, cell_m, limits, around)
+
+
+def _detour(
+    guide: Guide,
+    a: int,
+    b: int,
+    corners: Array,
+    around: Surroundings,
+    limits: FlightLimits,
+    horizon_m: float,
+    cell_m: float,
+) -> tuple[int, Way]:
+    """The sample at which it ends, and the detour; it goes straight on to the next track point where that is clear."""
+    way, next_point = guide.way, _next_point(guide, b)
+    end_m = way.points_m[next_point].copy()
+    ends = ends_of(corners[0].copy(), end_m, around, limits)
+    if next_point > b and not blocked_samples(way.points_m[b : next_point + 1], around, limits).any():
+        rest = np.vstack((corners, end_m))
+        straight = straighten(rest, cell_m, limits, around, ends)
+        if len(straight) < len(rest):
+            corners, b = straight, next_point
     legs = np.full(len(corners), way.samples[a : b + 1, LEG_SPEED].max())
     corridor_m = WIDER_AROUND_OBSTACLES * limits.corridor_m
-    detour = _dense(corners, legs, corridor_m, horizon_m / SAMPLES_PER_HORIZON, limits)
-    return Guide(_spliced(way, a, b, detour), _moved_arcs(guide, a, b, detour), guide.first_index)
-
-
-def _anchors(way: Way, piece: tuple[int, int], around: Surroundings, limits: FlightLimits) -> tuple[int, int]:
-    """Where to leave and where to rejoin a way around a blocked piece: clear samples, some way off."""
-    blocked, pull_m = blocked_samples(way.points_m, around, limits), _pull_m(limits)
-    a, b = piece[0] - 1, piece[1] + 1
-    while a > 0 and way.arc_m[piece[0]] - way.arc_m[a] < pull_m:
-        a -= 1
-    while b < len(way.arc_m) - 1 and way.arc_m[b] - way.arc_m[piece[1]] < pull_m and not blocked[b + 1]:
-        b += 1
-    return max(a, 0), b
+    return b, _dense(corners, legs, corridor_m, horizon_m / SAMPLES_PER_HORIZON, limits)
 
 
 def _pull_m(limits: FlightLimits) -> float:
@@ -214,19 +328,24 @@ def _pull_m(limits: FlightLimits) -> float:
     return limits.avoidance_distance_m + limits.clearance_m
 
 
-def _spliced(way: Way, a: int, b: int, detour: Way) -> Way:
-    """`way` with its samples from a to b replaced by `detour`, which begins and ends in these two."""
-    longer_m = detour.arc_m[-1] - (way.arc_m[b] - way.arc_m[a])
-    return Way(
+def _begun_anew(guide: Guide, a: int, b: int, detour: Way) -> Guide:
+    """A guide that begins with a detour and goes on behind the b-th sample of the old one."""
+    passed = min(int(np.searchsorted(guide.track_arc_m, guide.way.arc_m[a] + MERGED_M)), len(guide.track_arc_m) - 1)
+    spliced = _spliced(guide, a, b, detour)
+    before_m = guide.way.arc_m[a]
+    way = Way(np.ascontiguousarray(spliced.way.samples[a:]), spliced.way.arc_m[a:] - before_m)
+    return Guide(way, spliced.track_arc_m[passed:] - before_m, guide.first_index + passed)
+
+
+def _spliced(guide: Guide, a: int, b: int, detour: Way) -> Guide:
+    """The guide with its samples from a to b replaced; track points that lay on them keep their share of the way."""
+    way, arcs = guide.way, guide.way.arc_m
+    length_m = float(detour.arc_m[-1])
+    longer_m = length_m - (arcs[b] - arcs[a])
+    spliced = Way(
         np.vstack((way.samples[:a], detour.samples, way.samples[b + 1 :])),
-        np.concatenate((way.arc_m[:a], way.arc_m[a] + detour.arc_m, way.arc_m[b + 1 :] + longer_m)),
+        np.concatenate((arcs[:a], arcs[a] + detour.arc_m, arcs[b + 1 :] + longer_m)),
     )
-
-
-def _moved_arcs(guide: Guide, a: int, b: int, detour: Way) -> Array:
-    """Arcs of the track points after a splice; those that lay on the replaced piece keep their share of it."""
-    arcs, length_m = guide.way.arc_m, detour.arc_m[-1]
-    end_m = arcs[-1] + length_m - (arcs[b] - arcs[a])
     old = np.array([0.0, arcs[a], arcs[b], arcs[-1]])
-    new = np.array([0.0, arcs[a], arcs[a] + length_m, end_m])
-    return np.interp(guide.track_arc_m, old, new)
+    new = np.array([0.0, arcs[a], arcs[a] + length_m, arcs[-1] + longer_m])
+    return Guide(spliced, np.interp(guide.track_arc_m, old, new), guide.first_index)

@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from companion.mapping.distance_field import Field, distance_at, no_field
+from companion.mapping.distance_field import Field, distance_at, lower_to_field, no_field
 from companion.planner.traffic import Traffic, crowding, mover_clearance, no_traffic
 from companion.settings import Reserve
 from missions.kernels import compiled
 from missions.mission import Mission, Site
-from missions.obstacles import Obstacles, clearance_at, terrain_height_at
+from missions.obstacles import Obstacles, clearance_at, fill_clearance, terrain_height_at
 
 Array = npt.NDArray[np.float64]
 
@@ -150,6 +150,8 @@ def lacking(
         out: (m,) is filled with metres; 0 where all is kept.
     """
     obstacles, zones_m, room_m, eased = around.obstacles, around.zones_m, around.room_m, is_eased(ends, limits)
+    moving = around.moving
+    crowded = len(moving.bodies) > 0
     for i in range(len(points_m)):
         east, north, up = points_m[i, 0], points_m[i, 1], points_m[i, 2]
         clearance_m, height_m, allowed_m, in_zone = limits.clearance_m, limits.height_m, 0.0, False
@@ -166,7 +168,8 @@ def lacking(
         ground_m = terrain_height_at(east, north, obstacles) if len(obstacles.peaks) > 0 else 0.0
         out[i] = max(clearance_m - free_m[i], 0.0) + max(height_m - (up - ground_m), 0.0)
         out[i] += max(outside(points_m, i, room_m) - allowed_m, 0.0)
-        out[i] += crowding(east, north, up, i * step_s, in_zone, around.moving)
+        if crowded:
+            out[i] += crowding(east, north, up, i * step_s, in_zone, moving)
 
 
 @compiled
@@ -186,13 +189,19 @@ def free_at(east: float, north: float, up: float, around: Surroundings) -> float
 
 
 @compiled
+def fill_standing(points_m: Array, around: Surroundings, out: Array) -> None:
+    """Fill `out` (m,) with the distances of (m, 3 or more) points to what stands [m]."""
+    fill_clearance(points_m, around.obstacles, out)
+    lower_to_field(points_m, around.field, out)
+
+
+@compiled
 def free_space(points_m: Array, step_s: float, around: Surroundings, out: Array) -> None:
     """Fill `out` (m,) with the clearance of (m, 3 or more) points, `step_s` apart in time [m]."""
-    among_movers = len(around.moving.bodies) > 0
-    for i in range(len(points_m)):
-        east, north, up = points_m[i, 0], points_m[i, 1], points_m[i, 2]
-        out[i] = free_at(east, north, up, around)
-        if among_movers:
+    fill_standing(points_m, around, out)
+    if len(around.moving.bodies) > 0:
+        for i in range(len(points_m)):
+            east, north, up = points_m[i, 0], points_m[i, 1], points_m[i, 2]
             out[i] = min(out[i], mover_clearance(east, north, up, i * step_s, around.moving))
 
 

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.planner.archive import Archive, Offer, best_ranked, leader, new_archive, offer
-from companion.planner.dominance import dominates, is_feasible, is_preferred
+from companion.planner.dominance import dominates, is_feasible, is_preferred, weighted_sum
 from companion.planner.evaluation import LocalProblem, evaluate
 from companion.planner.tabu import TabuMemory, go_to, new_memory, tabu_step
+from companion.settings import SearchSettings
 from missions.kernels import compiled
 
 Array = npt.NDArray[np.float64]
@@ -26,6 +27,8 @@ VELOCITY_SHARE = 0.5
 """Highest velocity, as a share of the spread."""
 REACH = 3.0
 """Shifts are kept within so many spreads of the reference."""
+STALLED_M = 2e-3
+"""A generation that betters the weighted sum by less than this has not found anything."""
 FIRST_STEP, LAST_STEP = 0.5, 0.02
 """Steps of the tabu search, as shares of the spread."""
 
@@ -41,6 +44,28 @@ class SearchPlan(NamedTuple):
     adaptive_leader: bool
     weights: Array
     """(3,) phi."""
+    stall: int
+    """Generations without a better candidate after which a search ends."""
+    particles: int
+    archive_size: int
+    tabu_neighbours: int
+    tabu_length: int
+
+
+def search_plan(settings: SearchSettings, weights: Array) -> SearchPlan:
+    """The settings of a search with (3,) weights phi."""
+    return SearchPlan(
+        settings.iterations,
+        settings.patience_generations,
+        settings.weighted_dominance,
+        settings.adaptive_leader,
+        weights,
+        settings.stall_generations,
+        settings.particles,
+        settings.archive_size,
+        settings.tabu_neighbours,
+        settings.tabu_length,
+    )
 
 
 class Swarm(NamedTuple):
@@ -64,6 +89,7 @@ class Swarm(NamedTuple):
     neighbour_values: Array
 
 
+@compiled
 def new_swarm(x: Array, archive_size: int, tabu_neighbours: int, tabu_length: int) -> Swarm:
     """A swarm that begins at (p, d) positions and has not been evaluated yet."""
     particles, d = x.shape
@@ -93,12 +119,12 @@ def search(problem: LocalProblem, swarm: Swarm, spread: Array, plan: SearchPlan,
         rng: all of the search's randomness.
     """
     value, lead, step = np.empty(5), np.empty(len(spread)), np.empty(len(spread))
-    dominant_streak = barren_streak = 0
+    dominant_streak = barren_streak = stalled = 0
     for iteration in range(plan.iterations + 1):
         progress = iteration / max(plan.iterations, 1)
         if iteration > 0:
             follow_leader(swarm, lead, dominant_streak, barren_streak, plan, rng)
-        gained = False
+        gained, best_before = False, weighted_sum(swarm.best_value, plan.weights)
         for i in range(len(swarm.x)):
             if iteration > 0:
                 fly(swarm, i, lead, progress, spread, rng)
@@ -117,6 +143,10 @@ def search(problem: LocalProblem, swarm: Swarm, spread: Array, plan: SearchPlan,
                 gained |= record(swarm, swarm.neighbours[i], swarm.neighbour_values[i], plan)
         dominant_streak = dominant_streak + 1 if gained else 0
         barren_streak = 0 if gained else barren_streak + 1
+        better_m = best_before - weighted_sum(swarm.best_value, plan.weights)
+        stalled = 0 if better_m > STALLED_M or not is_feasible(swarm.best_value) else stalled + 1
+        if stalled >= plan.stall:
+            break
 
 
 @compiled
@@ -179,6 +209,7 @@ def takes_over(new: Array, old: Array, weights: Array, weighted: bool, rng: np.r
     return dominates(new, old, weights, weighted) or rng.random() < 0.5
 
 
+@compiled
 def chosen(swarm: Swarm, weights: Array) -> tuple[Array, Array]:
     """The candidate to be flown (d,) and its value (5,).
 
@@ -187,6 +218,6 @@ def chosen(swarm: Swarm, weights: Array) -> tuple[Array, Array]:
     """
     archive = swarm.archive
     if archive.n[0] == 0:
-        return swarm.best_x, swarm.best_value
+        return swarm.best_x, swarm.best_value.copy()
     best = best_ranked(archive, weights)
-    return archive.x[best], archive.values[best, :5]
+    return archive.x[best], archive.values[best, :5].copy()

@@ -11,10 +11,11 @@ from companion.mapping.sorting import Known
 from companion.planner.braking import brake_along
 from companion.planner.dominance import objective_weights
 from companion.planner.evaluation import HARD
-from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around
+from companion.planner.guide import Guide, lay_guide, lead_around
 from companion.planner.limits import Surroundings, flight_limits, free_space, surroundings
-from companion.planner.local_plan import Horizon, LocalPlanner
-from companion.planner.reference import LEG_SPEED, Way
+from companion.planner.local_plan import Horizon, LocalPlanner, plan_along, warm_way
+from companion.planner.mopso import search_plan
+from companion.planner.reference import Way
 from companion.planner.safety import first_lack
 from companion.planner.spline_shape import spline_shape
 from companion.planner.traffic import traffic
@@ -23,7 +24,6 @@ from companion.settings import Reserve, SearchSettings
 from missions import obstacles
 from missions.mission import Mission
 from missions.mission_items import Track
-from missions.time_law import arc_length
 from missions.trajectory import Motion, Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -101,11 +101,9 @@ class Planner:
         self.around = surroundings(mission, obstacles.pack(mission.world.as_known()), zones_m)
         self._local = LocalPlanner(
             self.limits,
-            self.around,
             Horizon(horizon_m, LONGEST_DURATION * horizon_m / mission.limits.cruise_speed_m_s),
             spline_shape(search.control_points),
-            search,
-            objective_weights(phi.length_weight, phi.clearance_weight, phi.height_weight),
+            search_plan(search, objective_weights(phi.length_weight, phi.clearance_weight, phi.height_weight)),
         )
         self._rng, self._mission_limits = rng, mission.limits
         self._map = LocalMap(
@@ -151,11 +149,14 @@ class Planner:
     def plan(self, request: PlanRequest) -> Plan:
         """Plan along the request's guide, which is first led around what blocks it."""
         around = self._around(request.start.position_m, request.start_s, request.neighbours)
-        guide = lead_around(request.guide, around, self.limits, self.horizon_m, self.cell_m)
+        place_m = request.start.position_m
+        guide = lead_around(
+            request.guide, around, self.limits, self.horizon_m, self.cell_m, request.arc_m, np.asarray(place_m)
+        )
         if guide is None or guide is request.guide:  # without a way around, as far as it goes
             return self._plan_along(request, request.guide, request.arc_m, around)
-        from_m = max(request.arc_m - self.horizon_m, 0.0)
-        arc_m = guide.project(request.start.position_m, from_m, 2.0 * self.horizon_m)
+        from_m = max(request.arc_m - self.horizon_m, 0.0) if guide.first_index == request.guide.first_index else 0.0
+        arc_m = guide.project(place_m, from_m, 2.0 * self.horizon_m)
         return self._plan_along(request, guide, arc_m, around)
 
     def is_clear(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> bool:
@@ -197,23 +198,18 @@ class Planner:
         return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)
 
     def _plan_along(self, request: PlanRequest, guide: Guide, arc_m: float, around: Surroundings) -> Plan:
-        warm = None if request.committed is None else self._warm_way(request, request.committed, guide, arc_m)
-        plan = replace(self._local, around=around).plan(guide.way, arc_m, np.array(request.start), warm, self._rng)
+        start = np.ascontiguousarray(request.start, dtype=float)
+        warm = self._warm_way(request.committed, request.start_s, guide, arc_m)
+        plan = plan_along(guide.way, arc_m, start, warm, self._local, around, self._rng)
         trajectory = Trajectory(plan.control_m, request.start_s, plan.knot_s)
         if plan.value[HARD] > 0.0 or not self.is_clear(trajectory, request.start_s, request.neighbours):
             return Plan(request, None, guide, arc_m)
         return Plan(request, trajectory, guide, arc_m, plan.goal_arc_m >= guide.length_m)
 
-    def _warm_way(self, request: PlanRequest, committed: Trajectory, guide: Guide, arc_m: float) -> Way | None:
-        """The committed path from the request's start on, and then the guide; None where that is no way at all."""
-        path = committed.sample(committed.grid(committed.knot_interval_s / 2.0, request.start_s)).position_m
-        joined_m = guide.project(path[-1], arc_m, 2.0 * self.horizon_m)
-        after = guide.way.samples[guide.way.arc_m > joined_m + MERGED_M]
-        points = np.vstack((path, after[:, :3]))
-        arcs = arc_length(points)
-        distinct = np.concatenate(([True], np.diff(arcs) > MERGED_M))
-        if np.count_nonzero(distinct) < 2:
-            return None
-        legs = np.interp(arcs + arc_m, guide.way.arc_m, guide.way.samples[:, LEG_SPEED])
-        samples = np.column_stack((points, legs, np.full(len(arcs), self.limits.corridor_m)))
-        return Way(np.ascontiguousarray(samples[distinct]), np.ascontiguousarray(arcs[distinct]))
+    def _warm_way(self, committed: Trajectory | None, start_s: float, guide: Guide, arc_m: float) -> Way:
+        """The committed path from the plan's start on, and then the guide; without samples if there is none."""
+        if committed is None:
+            return Way(np.empty((0, 5)), np.empty(0))
+        done_s = min(max(start_s - committed.start_s, 0.0), committed.duration_s)
+        done = done_s / committed.knot_interval_s
+        return warm_way(committed.control_points_m, done, guide.way, arc_m, self.limits.corridor_m)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from companion.planner.limits import FlightLimits, Surroundings, free_at, span, speed_limit
+from companion.planner.limits import FlightLimits, Surroundings, fill_standing, free_at, span, speed_limit
 from missions.kernels import compiled
 
 Array = npt.NDArray[np.float64]
@@ -82,9 +82,10 @@ def lay_reference(
     arc, times = np.zeros(PATH_SAMPLES), np.zeros(PATH_SAMPLES)
     follow(way, from_m, to_m, start, path)
     keep_off(path, limits, around)
+    free_m = np.empty(PATH_SAMPLES)
+    fill_standing(path, around, free_m)
     for j in range(PATH_SAMPLES):
-        free_m = free_at(path[j, 0], path[j, 1], path[j, 2], around)
-        aims[j] = min(path[j, LEG_SPEED], speed_limit(free_m, limits) * limits.nominal_ratio)
+        aims[j] = min(path[j, LEG_SPEED], speed_limit(free_m[j], limits) * limits.nominal_ratio)
         if j > 0:
             arc[j] = arc[j - 1] + apart(path, j, j - 1)
     reach_speeds(arc, aims, span(start[1, 0], start[1, 1], start[1, 2]), limits.braking_m_s2)
@@ -126,18 +127,24 @@ def keep_off(path: Array, limits: FlightLimits, around: Surroundings) -> None:
 
     Passing an obstacle a little farther off at full speed is better than passing it slowly.
     """
-    n = len(path)
+    n, wanted_m = len(path), max(limits.avoidance_distance_m, limits.clearance_m) + PUSHED_FARTHER_M
     pushed, moved = np.zeros((n, 3)), path.copy()
+    free = np.empty(n)
     for _ in range(PUSHES):
+        fill_standing(moved, around, free)
+        lacks = False
         for j in range(1, n - 1):
-            free_m = free_at(moved[j, 0], moved[j, 1], moved[j, 2], around)
-            lack_m = limits.avoidance_distance_m + PUSHED_FARTHER_M - free_m
+            free_m = free[j]
+            lack_m = wanted_m - free_m
+            lacks = lacks or 0.0 < lack_m < path[j, CORRIDOR]
             if 0.0 < lack_m < path[j, CORRIDOR]:
                 for axis in range(3):
                     moved[j, axis] += PROBE_M
                     slope = (free_at(moved[j, 0], moved[j, 1], moved[j, 2], around) - free_m) / PROBE_M
                     moved[j, axis] -= PROBE_M
                     pushed[j, axis] += slope * lack_m
+        if not lacks:
+            break
         for axis in range(3):
             before = 0.0
             for j in range(1, n - 1):

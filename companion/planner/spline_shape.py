@@ -4,7 +4,7 @@ A local trajectory is a uniform cubic B-spline (eq. 21) of n control points. The
 velocity, acceleration), the last three its end at rest; the n - 6 between them are free.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,7 @@ SMOOTHING = 0.1
 """Weight of squared third differences against squared distances from the path in the fit."""
 
 
-@dataclass(frozen=True)
-class SplineShape:
+class SplineShape(NamedTuple):
     """Constants for n control points, f = n - 6 free ones and K samples after the first."""
 
     rows: Array
@@ -29,6 +28,8 @@ class SplineShape:
     layout: Array
     """(f, 6 + f): ... plus those from the first and last three control points, plus the smooth modes: shifts of
     the free control points, the smoothest first, of like jerk, 1 m at most."""
+    into_modes: Array
+    """(f, f): weights of the smooth modes from shifts of the free control points."""
 
     @property
     def n_control(self) -> int:
@@ -63,6 +64,7 @@ def spline_shape(n_control: int) -> SplineShape:
         rows=np.ascontiguousarray(np.stack(bspline.uniform_rows(_phases()))),
         fit_path=np.ascontiguousarray(np.linalg.solve(gram, samples[:, free].T), dtype=float),
         layout=np.ascontiguousarray(np.hstack((-np.linalg.solve(gram, onto_ends), modes)), dtype=float),
+        into_modes=np.ascontiguousarray(np.linalg.inv(modes), dtype=float),
     )
 
 

@@ -38,6 +38,7 @@ class TabuMemory(NamedTuple):
     """(length,) ... and the iteration in which they were left; FREE_SLOT where there is none."""
 
 
+@compiled
 def new_memory(length: int, dimensions: int) -> TabuMemory:
     """A search that has not begun: anything is better than where it is."""
     return TabuMemory(

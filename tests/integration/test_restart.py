@@ -12,7 +12,7 @@ import pytest
 
 from tests.integration import programs
 
-SPEED = "1"
+SPEED = "2"
 PATIENCE_S = 120.0
 
 

@@ -6,7 +6,8 @@ import numpy.typing as npt
 from companion.planner.evaluation import DEVIATION_WEIGHT, SMOOTHNESS_WEIGHT, LocalProblem
 from companion.planner.guide import lay_guide
 from companion.planner.limits import FlightLimits, Surroundings, flight_limits, surroundings
-from companion.planner.local_plan import Horizon, LocalPlanner
+from companion.planner.local_plan import Horizon, LocalPlanner, pose, reference_within
+from companion.planner.mopso import search_plan
 from companion.planner.planner import Planner
 from companion.planner.reference import SPEED_CAP, TANGENT, WIDTH, Way
 from companion.planner.spline_shape import SAMPLES_PER_SEGMENT, spline_shape
@@ -48,9 +49,9 @@ def limits_and_surroundings(mission: Mission = INDOOR) -> tuple[FlightLimits, Su
 
 
 def local_planner(n_control: int = 12, settings: SearchSettings | None = None) -> LocalPlanner:
-    limits, around = limits_and_surroundings()
+    limits, _ = limits_and_surroundings()
     horizon = Horizon(INDOOR.onboard.horizon_m, 5.5)
-    return LocalPlanner(limits, around, horizon, spline_shape(n_control), settings or SearchSettings(), WEIGHTS)
+    return LocalPlanner(limits, horizon, spline_shape(n_control), search_plan(settings or SearchSettings(), WEIGHTS))
 
 
 def way_of(points_m: Array, speed_m_s: float = 3.0) -> Way:
@@ -67,8 +68,9 @@ def problem_of(
 ) -> LocalProblem:
     """The problem of planning from a state along a way."""
     planner = planner or local_planner()
-    _, reference = planner._reference_within(1.0, way_of(points_m, speed_m_s), 0.0, start)
-    return planner._problem(start, reference)
+    _, around = limits_and_surroundings()
+    _, reference = reference_within(1.0, way_of(points_m, speed_m_s), 0.0, start, planner, around)
+    return pose(start, reference, planner, around)
 
 
 def value_in_numpy(x: Array, problem: LocalProblem, mission: Mission = INDOOR) -> tuple[Trajectory, Array]:

@@ -8,14 +8,14 @@ import pytest
 from companion.planner import mopso, tabu
 from companion.planner.dominance import is_preferred, weighted_sum
 from companion.planner.evaluation import HARD, SOFT, LocalProblem, evaluate
-from companion.planner.mopso import SearchPlan, chosen, new_swarm, search, takes_over
+from companion.planner.mopso import SearchPlan, chosen, new_swarm, search, search_plan, takes_over
 from companion.planner.tabu import FREE_SLOT, TENURE, is_tabu, new_memory, put_on_list, release, tabu_step
 from companion.settings import SearchSettings
 from tests.unit.companion.planner.problems import WEIGHTS, local_planner, problem_of
 
 BESIDE_THE_CRATE_M = np.array([[5.0, 4.75, 1.5], [8.0, 4.6, 1.5]])
 AT_REST = np.array([BESIDE_THE_CRATE_M[0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-PLAN = SearchPlan(30, 3, True, True, WEIGHTS)
+PLAN = search_plan(SearchSettings(iterations=30, stall_generations=100), WEIGHTS)
 SPREAD = np.array([0.05, 0.15, 0.15, 0.15])
 
 
@@ -74,7 +74,7 @@ def test_the_swarm_finds_what_a_brute_force_grid_finds():
 def test_every_switch_of_the_method_still_finds_a_feasible_trajectory(changes: dict):
     problem = small_problem()
     for weighted, adaptive in itertools.product((True, False), repeat=2):
-        plan = SearchPlan(20, 3, weighted, adaptive, WEIGHTS)
+        plan = PLAN._replace(iterations=20, weighted_dominance=weighted, adaptive_leader=adaptive)
         _, value = chosen(searched(problem, plan, **changes), WEIGHTS)
         assert (value[HARD], value[SOFT]) == (0.0, 0.0)
 
@@ -87,7 +87,7 @@ def test_one_seed_is_one_search():
 
 
 def test_compiled_search_equals_its_own_source_run_by_python(monkeypatch: pytest.MonkeyPatch):
-    problem, plan = small_problem(), SearchPlan(3, 3, True, True, WEIGHTS)
+    problem, plan = small_problem(), PLAN._replace(iterations=3)
     compiled = searched(problem, plan, seed=2, particles=6)
     for module in (mopso, tabu):
         for name, function in list(vars(module).items()):
