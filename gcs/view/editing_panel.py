@@ -52,7 +52,7 @@ class EditingPanel:
             self._extent = gui.add_vector3("Size [m]", (1.0, 1.0, 1.0), step=0.1, visible=False)
             self._add_buttons()
             self._told = gui.add_html("")
-        self._on.on_update(lambda _: self._on_loop(self._switch))
+        self._on.on_update(lambda event: self._on_loop(self._switch) if event.client is not None else None)
         self._choice.on_update(lambda event: self._on_loop(self._chosen) if event.client is not None else None)
         self._extent.on_update(lambda event: self._on_loop(self._resize) if event.client is not None else None)
         self._tell("")

@@ -16,7 +16,7 @@ from gcs.errors import GcsError
 from gcs.flight import actions
 from gcs.link.codec import Codec
 from gcs.microservices.command_client import Command, CommandClient
-from gcs.microservices.mission_transfer_client import MissionDownload
+from gcs.microservices.mission_download import MissionDownload
 from gcs.station import Station
 from missions.mission_items import MissionItem
 from missions.tunnel import PayloadType, Reason
@@ -39,6 +39,7 @@ class OnboardWire:
     """The onboard link of one vehicle, in memory."""
 
     peer = None
+    budget_bytes_s = None
 
     def __init__(self, simulator: Simulator, sysid: int) -> None:
         self._simulator, self._sysid = simulator, sysid

@@ -85,6 +85,7 @@ class GroundWire:
     """The ground links of all vehicles, in memory: the station's connection to the simulator."""
 
     peer = None
+    budget_bytes_s = None
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
