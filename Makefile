@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-link bench-view fuzz screenshots check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-link bench-onboard bench-view fuzz screenshots check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -60,6 +60,9 @@ check-px4: install  ## fly the whole sequence on an autopilot that is there: mak
 
 bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)
+
+bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, fleets: make bench-onboard SEEDS=0:10
+	$(BIN)/python -m tests.benchmarks.onboard.fleet_rows --seeds $(SEEDS)
 
 bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK and MAVProxy, and a fleet of a hundred: make bench-link SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.link --seeds $(SEEDS) $(BENCH)

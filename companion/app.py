@@ -5,6 +5,7 @@ import time
 import traceback
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, TypeVar
 
 from companion import events, instructions
@@ -18,6 +19,7 @@ from companion.journal import Journal
 from companion.link.autopilot import Autopilot
 from companion.pilot import Pilot
 from companion.planner.planner import Plan, Planner, PlanRequest
+from companion.sensing.scan import Scan
 from companion.sensing.sensing import Sensing
 from companion.settings import CompanionSettings
 from companion.vehicle_clock import VehicleClock
@@ -76,6 +78,8 @@ class App:
         self._ended = asyncio.Event()
         self._state = self.pilot.state
         self._actions: set[asyncio.Task[None]] = set()
+        self._unseen: Scan | None = None
+        self._observing = False
 
     def request_stop(self) -> None:
         """Leave the vehicle in a chosen state and end; may be called again."""
@@ -141,11 +145,24 @@ class App:
             self.faults.tick(in_control=self.pilot.in_control, now_s=self._now_s)
 
     def _look(self) -> bool:
-        """Take in what the sensor has to say; whether it is silent."""
+        """Let the planner see what the sensor has seen; whether the sensor is silent."""
         if self.sensing is None:
             return False
-        self.sensing.look(self.pilot.briefing.frame, self._now_s)
+        scan = self.sensing.look(self.pilot.briefing.frame, self._now_s)
+        if scan is not None:
+            self._unseen = scan  # one that the planner had no time for is overtaken
+            if not self._observing:
+                self._observing = True
+                self._later(self._observe())
         return self.sensing.is_silent(self._now_s)
+
+    async def _observe(self) -> None:
+        """Show scans to the planner until there is none."""
+        while (scan := self._unseen) is not None:
+            self._unseen = None
+            others = self.fleet.exchange.neighbours(self._now_s) if self.fleet is not None else ()
+            await self.work(partial(self.planner.observe, scan, others))
+        self._observing = False
 
     async def _wait_for_stop(self) -> None:
         await self._stop.wait()
