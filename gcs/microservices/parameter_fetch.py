@@ -1,6 +1,6 @@
 """All parameters of a vehicle, from a kept copy where its `_HASH_CHECK` says that nothing has changed.
 
-PX4 sends `_HASH_CHECK` first when all are asked for, and stops when it gets it back; a GCS that knows the hash need not
+PX4 tells `_HASH_CHECK` when it is asked for it alone, and first when all are asked for; whoever knows the hash need not
 fetch 900 values. Missing ones are asked for by index.
 """
 
