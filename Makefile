@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-link bench-onboard bench-view fuzz screenshots check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes fuzz bench-view screenshots check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -61,6 +61,8 @@ check-px4: install  ## fly the whole sequence on an autopilot that is there: mak
 bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)
 
+experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10
+	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS)
 bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, fleets: make bench-onboard SEEDS=0:10
 	$(BIN)/python -m tests.benchmarks.onboard.fleet_rows --seeds $(SEEDS)
 
