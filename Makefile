@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -54,6 +54,10 @@ check-px4: install  ## fly the whole sequence on an autopilot that is there: mak
 
 bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)
+
+bench-onboard: SEEDS = 0:50
+bench-onboard: $(VENV)/.installed-bench  ## the onboard planner beside its requirements: make bench-onboard SEEDS=0:50 [BENCH=--quick]
+	$(BIN)/python -m tests.benchmarks.onboard --seeds $(SEEDS) $(BENCH)
 
 check: $(VENV)/.installed-dev  ## the fast checks: format, lint, types, import contracts
 	$(BIN)/ruff format --check .

@@ -12,6 +12,7 @@ from companion.deadman import DeadMan
 from companion.errors import CommandRefused, CompanionError
 from companion.events import Event, FlightMode
 from companion.fault_injection import FaultInjection
+from companion.fleet.desk import FleetDesk
 from companion.instructions import Instruction
 from companion.journal import Journal
 from companion.link.autopilot import Autopilot
@@ -53,6 +54,7 @@ class App:
         faults: what an experimenter has ordered.
         journal: where decisions are written.
         sensing: what the vehicle sees; None for one that sees nothing.
+        fleet: its link to the other companions; None for one that is alone.
         cpu_clock: CPU time [s] of the thread in which a plan is made, for the figures alone.
     """
 
@@ -65,6 +67,7 @@ class App:
     faults: FaultInjection
     journal: Journal
     sensing: Sensing | None = None
+    fleet: FleetDesk | None = None
     cpu_clock: Callable[[], float] = time.thread_time
 
     def __post_init__(self) -> None:
@@ -114,6 +117,8 @@ class App:
                 self._clock.observe(event.time_s, loop.time())
             if self.sensing is not None:
                 notice(self.sensing, event, self._now_s)
+            if self.fleet is not None:
+                self.fleet.notice(event)
             if not isinstance(event, events.RingReported):
                 self._handle(event)
 
@@ -124,7 +129,11 @@ class App:
             due_s = max(due_s + self.settings.pilot.tick_s / self._clock.pace, loop.time() - BEHIND_S)
             await asyncio.sleep(due_s - loop.time())
             late_s, age_s = loop.time() - due_s, self._clock.age_s(loop.time())
+            if self.fleet is not None:
+                self.fleet.listen(self._now_s)
             self._handle(events.Tick(age_s, lateness_ms=late_s * 1e3, sensor_silent=self._look()))
+            if self.fleet is not None:
+                self.fleet.speak(self.pilot.briefing.frame, self._now_s)
             if self.pilot.in_control:
                 self.deadman.feed()
             else:

@@ -17,7 +17,11 @@ from companion.app import App
 from companion.deadman import KernelTimer
 from companion.errors import CompanionError, UsageError
 from companion.fault_injection import FaultInjection
+from companion.fleet.desk import FleetDesk
+from companion.fleet.exchange import Exchange
 from companion.journal import Journal
+from companion.link.fleet_frames import FleetFrames
+from companion.link.fleet_port import FleetPort, parse_fleet_link
 from companion.link.px4 import Px4
 from companion.link.sensor_port import SensorPort, parse_address
 from companion.pilot import Pilot
@@ -31,7 +35,7 @@ from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
 from missions.lidar_packets import FIRST_PORT
 from missions.mission import Mission, SensorKind, load_mission
-from missions.ports import companion_port
+from missions.ports import RADIO_PORT, companion_port, fleet_port
 
 T = TypeVar("T")
 
@@ -54,6 +58,10 @@ def companion(
     sensor: Annotated[SensorKind, typer.Option(help="What the vehicle sees with.")] = SensorKind.LIDAR,
     lidar: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Where the lidar's packets come in.", show_default=False)
+    ] = None,
+    fleet_link: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="Where the other companions are; the simulator's radio without it."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
     fault: Annotated[list[str] | None, typer.Option(help=f"Something that goes wrong, such as {EXAMPLES[0]}.")] = None,
@@ -82,6 +90,8 @@ def companion(
             seed=seed,
             sensor=sensor,
             lidar_address=heard_at,
+            fleet_link=fleet_link or f"udpout://127.0.0.1:{RADIO_PORT + instance_base}",
+            fleet_port=fleet_port(vehicle) + instance_base,
             deadman_s=deadman_s,
         )
         loaded = _mission(mission, origin, vehicle)
@@ -119,6 +129,7 @@ async def _fly(
         warm_up(planner, mission, vehicle)
     with ExitStack() as open_ports, ThreadPoolExecutor(1, thread_name_prefix="planner") as threads:
         sensing = None if driver is None else _sensing(driver, settings, mission, open_ports)
+        fleet = _fleet(settings, mission, open_ports)
         loop = asyncio.get_running_loop()
 
         async def work(call: Callable[[], T]) -> T:
@@ -126,7 +137,7 @@ async def _fly(
 
         companion = App(
             settings,
-            Pilot(mission, settings, planner),
+            Pilot(mission, settings, planner, fleet.exchange),
             planner,
             Px4(settings.vehicle, settings.system_url, journal.tell, ring_hz=_ring_hz(settings, mission)),
             work,
@@ -134,6 +145,7 @@ async def _fly(
             FaultInjection(faults, settings.vehicle),
             journal,
             sensing,
+            fleet,
         )
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, companion.request_stop)
@@ -154,6 +166,17 @@ def _sensing(driver: Driver, settings: CompanionSettings, mission: Mission, open
         return Sensing(driver, rate_hz)
     port = open_ports.enter_context(SensorPort(*parse_address(settings.lidar_address)))
     return Sensing(driver, rate_hz, port.poll)
+
+
+def _fleet(settings: CompanionSettings, mission: Mission, open_ports: ExitStack) -> FleetDesk:
+    """The link to the other companions.
+
+    Raises:
+        UsageError: its URL is none, or its port cannot be bound.
+    """
+    port = open_ports.enter_context(FleetPort(parse_fleet_link(settings.fleet_link), settings.fleet_port))
+    frames = FleetFrames(settings.vehicle, mission.frame)
+    return FleetDesk(Exchange(settings.vehicle, mission), mission, frames, port.poll, port.send)
 
 
 def _ring_hz(settings: CompanionSettings, mission: Mission) -> float:

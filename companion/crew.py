@@ -4,6 +4,7 @@ import itertools
 from dataclasses import dataclass, field
 
 from companion.figures import Quantiles
+from companion.fleet.exchange import Exchange
 from companion.planner.planner import Planner
 from companion.settings import PilotSettings
 from missions.mission import Mission
@@ -30,6 +31,8 @@ class Crew:
     settings: PilotSettings
     speed: float
     """Vehicle seconds per wall-clock second."""
+    exchange: Exchange
+    """With the other vehicles."""
     figures: Figures = field(default_factory=Figures)
     _numbers: "itertools.count[int]" = field(default_factory=itertools.count)
 

@@ -66,7 +66,8 @@ class Engagement:
         place_m = self.order.frame.enu(odometry.position_m)
         guide = self._crew.planner.lay_guide(self.order.track, self._index, place_m)
         at_rest = Motion(place_m, np.zeros(3), np.zeros(3))
-        return PlanRequest(self._crew.next_number(), at_rest, now_s, guide, 0.0)
+        others = self._crew.exchange.neighbours(now_s, pending=True)
+        return PlanRequest(self._crew.next_number(), at_rest, now_s, guide, 0.0, neighbours=others)
 
     def _standing(self, plan: Plan, odometry: Odometry) -> instructions.SendSetpoint:
         """Hover where the first trajectory begins."""

@@ -12,15 +12,16 @@ import numpy as np
 
 from companion import events, instructions
 from companion.briefing import Briefing
-from companion.crew import Crew, Figures
+from companion.crew import Crew
 from companion.engagement import Engagement
 from companion.events import Event, FlightMode
+from companion.fleet.exchange import Exchange
 from companion.flight import Flight
 from companion.instructions import CommandResult, Instruction
 from companion.planner.planner import Plan, Planner
 from companion.settings import CompanionSettings
 from companion.start_answer import Situation, answer
-from companion.states import TRANSITIONS, UNDER_WAY, State
+from companion.states import UNDER_WAY, State, assert_possible
 from companion.status import StatusDesk
 from companion.utc_clock import UtcClock
 from companion.vehicle_clock import REBOOT_S
@@ -37,16 +38,21 @@ class Pilot:
         mission: with its final origin.
         settings: of this companion.
         planner: for its guide, its braking and its checks; plans themselves are asked for by instruction.
+        exchange: with the other vehicles; without one it flies alone.
     """
 
-    def __init__(self, mission: Mission, settings: CompanionSettings, planner: Planner) -> None:
+    def __init__(
+        self, mission: Mission, settings: CompanionSettings, planner: Planner, exchange: Exchange | None = None
+    ) -> None:
         self.state, self.reason = State.CONNECTING, Reason.NONE
         self.done = False
         """The program may end."""
         self._mission = mission
         self._desk = StatusDesk(mission.digest, settings.pilot.status_interval_s)
         self._settings = settings.pilot
-        self._crew = Crew(mission, planner, settings.pilot, settings.speed)
+        exchange = exchange or Exchange(settings.vehicle, mission)
+        self._crew = Crew(mission, planner, settings.pilot, settings.speed, exchange)
+        self.figures = self._crew.figures
         self.briefing = Briefing(mission, mission.vehicle(settings.vehicle), settings.mode)
         self._connected = False
         self._odometry: events.Odometry | None = None
@@ -77,10 +83,6 @@ class Pilot:
             events.StopRequested: self._on_stop,
             events.Tick: self._on_tick,
         }
-
-    @property
-    def figures(self) -> Figures:
-        return self._crew.figures
 
     @property
     def in_control(self) -> bool:
@@ -290,6 +292,7 @@ class Pilot:
         if self.in_control:
             yield instructions.EndSetpoints()
         self._flight = self._engagement = self._leaving = None
+        self._crew.exchange.end()
         self.done = self.done or self._stopping
 
     def _release(self, now_s: float) -> Iterator[Instruction]:
@@ -337,7 +340,7 @@ class Pilot:
         self._flight = Flight(self._crew, engagement.order, plan, self._odometry, now_s)
         self._enter(State.FLYING, Reason.NONE)
         yield instructions.Note("flying", {"guide_m": round(plan.guide.length_m, 2)})
-        yield from self._utc.stamped(self._flight.begin())
+        yield from self._utc.stamped(self._flight.begin(now_s))
 
     def _retreat(self, reason: Reason) -> Iterator[Instruction]:
         """Control could not be taken: everything is as it was before the start."""
@@ -391,10 +394,7 @@ class Pilot:
         if now_s - self._commanded_at_s > self._settings.command_retry_s:
             yield from self._leave(mode, now_s)
 
-    # -------------------------------------------------------------------- status
-
     def _enter(self, state: State, reason: Reason) -> None:
         """Change state; a transition that is not in the table is an error of ours."""
-        if state is not self.state and state not in TRANSITIONS[self.state] | {State.CONNECTING, State.FAILED}:
-            raise AssertionError(f"no transition from {self.state.name} to {state.name} ({reason.name})")
+        assert_possible(self.state, state, reason)
         self.state, self.reason = state, reason

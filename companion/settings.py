@@ -107,6 +107,10 @@ class CompanionSettings:
     sensor: SensorKind = SensorKind.LIDAR
     lidar_address: str = "127.0.0.1:56300"
     """HOST:PORT at which the lidar's packets come in."""
+    fleet_link: str = "udpout://127.0.0.1:14980"
+    """Where the other companions are reached."""
+    fleet_port: int = 14700
+    """Bound for a relay."""
     deadman_s: float = 0.5
     reserve: Reserve = field(default_factory=Reserve)
     search: SearchSettings = field(default_factory=SearchSettings)

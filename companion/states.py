@@ -1,6 +1,6 @@
 """The pilot's states and where each may lead; docs/companion.md says what they mean."""
 
-from missions.tunnel import CompanionState
+from missions.tunnel import CompanionState, Reason
 
 State = CompanionState
 
@@ -22,3 +22,13 @@ TRANSITIONS: dict[State, frozenset[State]] = {
 
 UNDER_WAY = frozenset({State.ENGAGING, State.FLYING, State.LANDING})
 """A MISSION_START in these has been obeyed already."""
+
+
+def assert_possible(before: State, after: State, reason: Reason) -> None:
+    """A transition that is not in the table is an error of ours.
+
+    Raises:
+        AssertionError: it is not.
+    """
+    if after is not before and after not in TRANSITIONS[before] | {State.CONNECTING, State.FAILED}:
+        raise AssertionError(f"no transition from {before.name} to {after.name} ({reason.name})")

@@ -178,6 +178,8 @@ def decode_simulator_fault(line: bytes) -> SimulatorFault:
         return msgspec.json.decode(line, type=SimulatorFault)
     except (msgspec.DecodeError, UnicodeDecodeError) as invalid:
         raise MissionError(f"control: {invalid}") from None
+    except RecursionError:
+        raise MissionError("control: expected one fault, found values nested too deeply") from None
 
 
 def parse_any_fault(text: str) -> Fault | SimulatorFault:

@@ -87,7 +87,7 @@ class TrajectoryMessage(msgspec.Struct, frozen=True, kw_only=True):
     trajectory: Trajectory
     """Its `start_s` is UTC [s]."""
     announced_s: float = 0.0
-    """When it was first told to the others, UTC [s]: earlier ones go first."""
+    """When it was first told to the others, UTC [s], to a millisecond: earlier ones go first."""
     age_s: float = 0.0
     """How long after that this copy was sent; up to 65 s."""
     rank: int = 0
@@ -115,6 +115,8 @@ class CompanionStatus(msgspec.Struct, frozen=True, kw_only=True):
 _TRAJECTORY = struct.Struct("<BBBBIIQiiiIHiH")
 _POINT = struct.Struct("<hhh")
 _STATUS = struct.Struct("<BBBxIIHHHHHHI")
+MOST_POINTS = (MAX_PAYLOAD_BYTES - _TRAJECTORY.size) // _POINT.size
+"""Control points of a trajectory that fit into a payload."""
 _TIME_UNIT_S = 1e-4
 _FURTHEST_ANNOUNCED = 2**31 - 1
 _CM = 100.0
@@ -170,7 +172,7 @@ def decode_trajectory(payload: bytes) -> TrajectoryMessage:
         revision=revision,
         radius_m=radius / _CM,
         trajectory=Trajectory(points_m, start_us / 1e6, knot * _TIME_UNIT_S),
-        announced_s=start_us / 1e6 + announced * _TIME_UNIT_S,
+        announced_s=round(start_us / 1e6 + announced * _TIME_UNIT_S, 3),
         age_s=age_ms / 1e3,
         rank=rank,
     )

@@ -131,9 +131,10 @@ class Vehicle:
             "SETUP_SIGNING": self._signing.receive_setup,
             "FILE_TRANSFER_PROTOCOL": self._absent.receive_file_request,
             "LOG_REQUEST_LIST": self._absent.receive_log_request,
-            "PARAM_REQUEST_LIST": parameters.receive_list,
-            "PARAM_REQUEST_READ": parameters.receive_read,
-            "PARAM_SET": parameters.receive_set,
+            "PARAM_REQUEST_LIST": self._by_name(parameters.receive_list),
+            "PARAM_REQUEST_READ": self._by_name(parameters.receive_read),
+            "PARAM_SET": self._by_name(parameters.receive_set),
+            "SET_GPS_GLOBAL_ORIGIN": lambda m, s: self._tell_origin(s),
             "MISSION_COUNT": lambda m, s: transfers[s.link].receive_count(m, s, self._now_s),
             "MISSION_ITEM_INT": lambda m, s: transfers[s.link].receive_item_int(m, s, self._now_s),
             "MISSION_ITEM": lambda m, s: transfers[s.link].receive_item(m, s, self._now_s),
@@ -144,6 +145,14 @@ class Vehicle:
             "MISSION_CLEAR_ALL": lambda m, s: transfers[s.link].receive_clear_all(m, s),
             "MISSION_SET_CURRENT": lambda m, s: transfers[s.link].receive_set_current(m),
         }
+
+    def _tell_origin(self, sender: Sender) -> None:
+        """Who wants another origin is told which one it is: it lies where the estimator started."""
+        self._streams[sender.link].send_now("GPS_GLOBAL_ORIGIN", self._moment())
+
+    def _by_name(self, handler: Handler) -> Handler:
+        """Only for messages to this very system: parameters are not set by whoever speaks to everybody."""
+        return lambda m, s: handler(m, s) if m.target_system == self.sysid else None
 
     # ------------------------------------------------------------------ state
     @property

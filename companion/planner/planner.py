@@ -12,7 +12,7 @@ from companion.planner.braking import brake_along
 from companion.planner.dominance import objective_weights
 from companion.planner.evaluation import HARD
 from companion.planner.guide import Guide, lay_guide, lead_around
-from companion.planner.limits import Surroundings, flight_limits, surroundings
+from companion.planner.limits import Surroundings, flight_limits, free_space, surroundings
 from companion.planner.local_plan import Horizon, LocalPlanner, plan_along, warm_way
 from companion.planner.mopso import search_plan
 from companion.planner.reference import Way
@@ -178,6 +178,14 @@ class Planner:
         control_m, knot_s = trajectory.control_points_m, trajectory.knot_interval_s
         after_s, _ = first_lack(control_m, knot_s, done, self._required, around)
         return begin_s + after_s
+
+    def may_rest(self, places_m: Array) -> npt.NDArray[np.bool_]:
+        """Which of (n, 3) places are clear enough to rest there, as far as is known and was seen."""
+        places_m, free_m = np.ascontiguousarray(places_m, dtype=float), np.empty(len(places_m))
+        free_space(places_m, 0.0, self.around._replace(field=self._map.view.field), free_m)
+        low_m, high_m = self.around.room_m
+        inside = np.all((places_m >= low_m) & (places_m <= high_m), axis=1)
+        return inside & (free_m >= self.limits.clearance_m)
 
     def _around(self, place_m: Array, begin_s: float, neighbours: tuple[Neighbour, ...]) -> Surroundings:
         """Everything around a vehicle that is at a place at a time."""

@@ -188,8 +188,8 @@ class Commander:
         return self.arm("mission start") if result is Result.ACCEPTED else result
 
     def terminate(self) -> Result:
-        """End the flight where it is: only in the air."""
-        if not self.armed or self._situation.landed:
+        """End the flight where it is; who is not armed has none."""
+        if not self.armed:
             return Result.DENIED
         self._terminated_s = self._now_s
         return Result.ACCEPTED

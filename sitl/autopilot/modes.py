@@ -50,7 +50,9 @@ class Mode(Enum):
     )
     POSITION = ModeTraits("Position", MainMode.POSITION, base_mode=_STICKS, standard_mode=1, needs_sticks=True)
     POSITION_SLOW = ModeTraits("Position Slow", MainMode.POSITION, 2, base_mode=_STICKS, needs_sticks=True)
-    ORBIT = ModeTraits("Orbit", MainMode.POSITION, 1, base_mode=_STICKS, standard_mode=2, allows_arming=False)
+    ORBIT = ModeTraits(
+        "Orbit", MainMode.POSITION, 1, base_mode=CUSTOM | STABILIZE, standard_mode=2, allows_arming=False
+    )
     ACRO = ModeTraits("Acro", MainMode.ACRO, base_mode=CUSTOM | MANUAL_INPUT, needs_sticks=True, needs_position=False)
     STABILIZED = ModeTraits(
         "Stabilized", MainMode.STABILIZED, base_mode=_STICKS, needs_sticks=True, needs_position=False
@@ -81,8 +83,21 @@ class Mode(Enum):
 
 
 def mode_of(main: int, sub: int) -> Mode | None:
-    """The mode with these numbers, if this autopilot has it."""
-    for mode in Mode:
-        if mode.value.main == main and (mode.value.sub == sub or main not in (MainMode.AUTO, MainMode.POSITION)):
-            return mode
-    return None
+    """The mode that a pilot selects by these numbers, if this autopilot has it; without a sub mode, Auto is Mission."""
+    if main == MainMode.POSITION:
+        return Mode.POSITION_SLOW if sub == Mode.POSITION_SLOW.value.sub else Mode.POSITION
+    if main == MainMode.AUTO:
+        wanted = sub or Mode.MISSION.value.sub
+        return next((mode for mode in Mode if mode.value.main == main and mode.value.sub == wanted), None)
+    return next((mode for mode in Mode if mode.value.main == main), None)
+
+
+def mode_of_flags(base_mode: int) -> Mode | None:
+    """The mode that MAV_MODE_FLAGs alone ask for, as programs do that know nothing of PX4; None for no flag."""
+    if base_mode & AUTO:
+        return Mode.MISSION
+    if not base_mode & MANUAL_INPUT:
+        return None
+    if base_mode & GUIDED:
+        return Mode.POSITION
+    return Mode.STABILIZED if base_mode & STABILIZE else Mode.MANUAL

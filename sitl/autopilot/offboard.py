@@ -114,7 +114,7 @@ class Offboard:
         if target.frame == FRAME_BODY_NED and all(math.isnan(p) for p in setpoint.position_m):
             setpoint = _turned(setpoint, here.yaw_rad)
         elif target.frame == FRAME_BODY_NED:
-            return self._refuse("SET_POSITION_TARGET_LOCAL_NED with position in frame 8 unsupported")
+            return self._refuse("SET_POSITION_TARGET_LOCAL_NED invalid")
         elif target.frame != FRAME_LOCAL_NED:
             return self._refuse(f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {target.frame} unsupported")
         return self._take("SET_POSITION_TARGET_LOCAL_NED", target, setpoint, now_s)

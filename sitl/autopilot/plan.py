@@ -30,7 +30,7 @@ class Cmd(IntEnum):
     DO_JUMP = 177
     DO_CHANGE_SPEED = 178
     DO_SET_HOME = 179
-    DO_SET_SERVO = 183
+    DO_SET_ACTUATOR = 187
     DO_LAND_START = 189
     DO_SET_ROI_LOCATION = 195
     DO_SET_ROI_NONE = 197
@@ -39,9 +39,10 @@ class Cmd(IntEnum):
     DO_MOUNT_CONFIGURE = 204
     DO_MOUNT_CONTROL = 205
     DO_SET_CAM_TRIGG_DIST = 206
+    DO_GRIPPER = 211
     DO_SET_CAM_TRIGG_INTERVAL = 214
+    OBLIQUE_SURVEY = 260
     SET_CAMERA_MODE = 530
-    SET_CAMERA_ZOOM = 531
     SET_CAMERA_FOCUS = 532
     DO_GIMBAL_MANAGER_PITCHYAW = 1000
     DO_GIMBAL_MANAGER_CONFIGURE = 1001
@@ -50,6 +51,7 @@ class Cmd(IntEnum):
     DO_TRIGGER_CONTROL = 2003
     VIDEO_START_CAPTURE = 2500
     VIDEO_STOP_CAPTURE = 2501
+    DO_VTOL_TRANSITION = 3000
     FENCE_RETURN_POINT = 5000
     FENCE_POLYGON_INCLUSION = 5001
     FENCE_POLYGON_EXCLUSION = 5002
@@ -62,6 +64,7 @@ PLACES = frozenset({Cmd.NAV_WAYPOINT, Cmd.NAV_LOITER_UNLIM, Cmd.NAV_LOITER_TIME,
 """Items to fly to, which need a latitude and a longitude."""
 TAKEOFF_AND_LANDING = frozenset({Cmd.NAV_TAKEOFF, Cmd.NAV_LAND})
 """Items that may do without a place: where the vehicle is."""
+POLYGONS = frozenset({Cmd.FENCE_POLYGON_INCLUSION, Cmd.FENCE_POLYGON_EXCLUSION})
 FENCES = frozenset(cmd for cmd in Cmd if 5000 <= cmd < 5100)
 MISSION_COMMANDS = frozenset(cmd for cmd in Cmd if cmd < 5000)
 

@@ -12,6 +12,9 @@ from sitl.link.udp import LARGEST_DATAGRAM_BYTES, bind
 from sitl.settings import CONTROL_PORT, Settings
 from sitl.simulator import Simulator
 
+MOST_LINES = 100
+"""Of one datagram; what comes after them is left out."""
+
 
 class Answer(msgspec.Struct, frozen=True, omit_defaults=True):
     """What becomes of one line."""
@@ -57,8 +60,8 @@ class ControlPort:
 
 
 def obey(simulator: Simulator, datagram: bytes) -> bytes:
-    """Carry out a datagram line by line; one line of answer for each, whatever is in it."""
-    lines = [line for line in datagram.split(b"\n") if line.strip()]
+    """Carry out a datagram line by line, up to a hundred; one line of answer for each, whatever is in it."""
+    lines = [line for line in datagram.split(b"\n", MOST_LINES)[:MOST_LINES] if line.strip()]
     return b"".join(msgspec.json.encode(_answer(simulator, line)) + b"\n" for line in lines)
 
 

@@ -15,6 +15,10 @@ REPEATED_WITHIN_S = 5.0
 """Wall clock: a copy of a command with confirmation > 0 that comes this soon after the last copy is the same order."""
 
 
+MOST_REMEMBERED = 64
+"""Of the commands that might be repeated, the last ones."""
+
+
 @dataclass(frozen=True)
 class Command:
     """A command, whichever message it came in."""
@@ -101,9 +105,15 @@ class CommandServer:
             result, last.time_s = last.result, now_s
         else:
             result = self._execute(command, sender)
-            self._last[key] = _Last(command, result, now_s)
+            self._remember(key, _Last(command, result, now_s))
         if result is not None:
             self.acknowledge(command.number, result, sender)
+
+    def _remember(self, key: tuple[Sender, int], last: _Last) -> None:
+        self._last.pop(key, None)
+        self._last[key] = last
+        if len(self._last) > MOST_REMEMBERED:
+            del self._last[next(iter(self._last))]
 
     def _execute(self, command: Command, sender: Sender) -> Result | None:
         if any(math.isinf(param) for param in command.params):

@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from sitl.autopilot.modes import Mode, mode_of
+from sitl.autopilot.modes import Mode, mode_of, mode_of_flags
 from sitl.autopilot.orbit import OrbitOrder
 from sitl.autopilot.places import LocalPoint, is_place
 from sitl.autopilot.reports import Result, Severity
@@ -31,9 +31,10 @@ def _arm(server: CommandServer, command: Command, sender: Sender) -> Result | No
 
 def _set_mode(server: CommandServer, command: Command, sender: Sender) -> Result:
     base, main, sub = (_number(param) for param in command.params[:3])
-    if not base & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED or main not in _KNOWN_MAIN_MODES:
+    by_number = bool(base & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+    mode = mode_of(main, sub) if by_number else mode_of_flags(base)
+    if mode is None and (not by_number or main not in _KNOWN_MAIN_MODES):
         return Result.ACCEPTED  # as PX4: taken, without effect
-    mode = mode_of(main, sub)
     if mode is None:
         server.say(Severity.CRITICAL, "Unsupported auto mode" if main == _AUTO else "Unsupported mode")
         return Result.TEMPORARILY_REJECTED
@@ -88,7 +89,10 @@ def _terminate(server: CommandServer, command: Command, sender: Sender) -> Resul
 
 # -------------------------------------------------------------------- flight
 def _reposition(server: CommandServer, command: Command, sender: Sender) -> Result:
-    """The altitude is AMSL whatever the frame; without the bit that switches to Hold it counts only for who holds."""
+    """The altitude is AMSL whatever the frame; without the bit that switches to Hold it counts only for who holds.
+
+    A PX4 then calls the command unsupported, and flies to the place all the same.
+    """
     autopilot = server.autopilot
     frame, (latitude_deg, longitude_deg) = autopilot.craft.frame, command.place
     z_m = frame.origin.altitude_m - command.params[6]
@@ -99,15 +103,14 @@ def _reposition(server: CommandServer, command: Command, sender: Sender) -> Resu
         return Result.DENIED
     switches = _number(command.params[1]) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
     if not switches and autopilot.mode is not Mode.HOLD:
-        return Result.ACCEPTED
-    result = autopilot.request_mode(Mode.HOLD) if switches else Result.ACCEPTED
-    if result is not Result.ACCEPTED:
-        return result
+        return Result.UNSUPPORTED
+    if switches and (refused := autopilot.request_mode(Mode.HOLD)) is not Result.ACCEPTED:
+        return refused
     if command.params[0] > 0.0:
         autopilot.craft.change_speed(command.params[0])
     yaw_rad = command.params[3]
     autopilot.navigator.reposition(target, yaw_rad, autopilot.snapshot, autopilot.now_s)
-    return Result.ACCEPTED
+    return Result.ACCEPTED if switches else Result.UNSUPPORTED
 
 
 def _change_speed(server: CommandServer, command: Command, sender: Sender) -> Result:

@@ -10,6 +10,7 @@ from sitl.autopilot.plan import (
     INT_UNSET,
     MISSION_COMMANDS,
     PLACES,
+    POLYGONS,
     RELATIVE_FRAMES,
     TAKEOFF_AND_LANDING,
     Cmd,
@@ -20,6 +21,8 @@ from sitl.microservices.outbox import Sender
 FRAME_GLOBAL_INT, FRAME_RELATIVE_INT, FRAME_MISSION = 5, 6, 2
 GLOBAL_FRAMES = frozenset({0, 3, 5, 6})
 HIGHEST_M = 100_000.0
+LEAST_VERTICES = 3
+"""Of a fence's polygon."""
 
 _AT_A_PLACE = PLACES | TAKEOFF_AND_LANDING | {Cmd.DO_SET_ROI, Cmd.DO_SET_ROI_LOCATION}
 _PLACED_COMMANDS = {0: _AT_A_PLACE, 1: FENCES | PLACES, 2: frozenset({Cmd.RALLY_POINT})}
@@ -67,7 +70,7 @@ def int_item(item: MissionItem, seq: int, receiver: Sender, kind: int) -> Messag
         item.frame,
         item.command,
         1 if seq == 0 else 0,
-        1,
+        _autocontinue(kind),
         item.param1,
         item.param2,
         item.param3,
@@ -89,7 +92,7 @@ def float_item(item: MissionItem, seq: int, receiver: Sender, kind: int) -> Mess
         frame,
         item.command,
         1 if seq == 0 else 0,
-        1,
+        _autocontinue(kind),
         item.param1,
         item.param2,
         item.param3,
@@ -109,11 +112,13 @@ def _checked(message: Message, x: int, y: int, kind: int) -> MissionItem:
     if command not in known[kind]:
         raise ItemRefused(mavlink.MAV_MISSION_UNSUPPORTED)
     _refuse_bad_parameters(message)
+    if command in POLYGONS and not message.param1 >= LEAST_VERTICES:
+        raise ItemRefused(mavlink.MAV_MISSION_ERROR)
     if command in PLACES or command in TAKEOFF_AND_LANDING or kind != 0:
         _refuse_bad_place(message, x, y, optional=command in TAKEOFF_AND_LANDING)
     return MissionItem(
         command=command,
-        frame=_stored_frame(message.frame),
+        frame=_stored_frame(message.frame, kind),
         param1=message.param1,
         param2=message.param2,
         param3=message.param3,
@@ -143,11 +148,18 @@ def _refuse_bad_place(message: Message, x: int, y: int, *, optional: bool) -> No
         raise ItemRefused(mavlink.MAV_MISSION_INVALID_PARAM7)
 
 
-def _stored_frame(frame: int) -> int:
-    """PX4 gives positions back in the _INT frames."""
+def _stored_frame(frame: int, kind: int) -> int:
+    """PX4 gives positions back in the _INT frames; a fence, which has no altitude, in the one above sea level."""
     if frame == FRAME_MISSION:
         return frame
+    if kind == mavlink.MAV_MISSION_TYPE_FENCE:
+        return FRAME_GLOBAL_INT
     return FRAME_RELATIVE_INT if frame in RELATIVE_FRAMES else FRAME_GLOBAL_INT
+
+
+def _autocontinue(kind: int) -> int:
+    """What PX4 says of its stored items."""
+    return 0 if kind == mavlink.MAV_MISSION_TYPE_FENCE else 1
 
 
 def _degrees_e7(degrees: float) -> int:

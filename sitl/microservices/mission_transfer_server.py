@@ -157,6 +157,7 @@ class MissionTransferServer:
     def _receive_item(self, message: Message, sender: Sender, now_s: float) -> None:
         upload = self._upload
         if upload is None:
+            self._say(Severity.CRITICAL, "IGN MISSION_ITEM: No transfer")
             self._acknowledge(sender, mavlink.MAV_MISSION_ERROR, message.mission_type)
             return
         if sender != upload.sender:

@@ -7,6 +7,9 @@ has been heard there. What is for the autopilot alone, comes from its own id, or
 from sitl.dialect import Message
 from sitl.microservices.outbox import AUTOPILOT_COMPID, Link, Sender
 
+MOST_HEARD = 256
+"""Of the systems and components that speak on a link, this many are remembered: those that were heard last."""
+
 
 class Router:
     """Who has been heard on which link.
@@ -17,17 +20,19 @@ class Router:
 
     def __init__(self, sysid: int) -> None:
         self._sysid = sysid
-        self._heard: dict[Link, set[tuple[int, int]]] = {link: set() for link in Link}
+        self._heard: dict[Link, dict[tuple[int, int], None]] = {link: {} for link in Link}
 
     def forwards(self, message: Message, sender: Sender) -> bool:
         """Take note of the sender; whether the message goes on to the other link."""
         if sender.sysid == self._sysid and sender.compid == AUTOPILOT_COMPID:
             return False
-        self._heard[sender.link].add((sender.sysid, sender.compid))
+        self._remember(sender)
         if message.get_type() == "SETUP_SIGNING":  # a key goes to whom it is for, and nowhere else
             return False
         target = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
+        if message.get_type() == "MANUAL_CONTROL":  # its receiver has another name
+            target = message.target
         if target == 0:
             return True
         if target == self._sysid and component == AUTOPILOT_COMPID:
@@ -36,6 +41,13 @@ class Router:
         if component == 0:
             return any(sysid == target for sysid, _ in there)
         return (target, component) in there
+
+    def _remember(self, sender: Sender) -> None:
+        heard, who = self._heard[sender.link], (sender.sysid, sender.compid)
+        heard.pop(who, None)
+        heard[who] = None
+        if len(heard) > MOST_HEARD:
+            del heard[next(iter(heard))]
 
     def is_for_autopilot(self, message: Message) -> bool:
         """Whether the autopilot itself is meant, alone or among others; nobody obeys a command to everybody."""

@@ -1,6 +1,7 @@
 """MAVSDK flies the simulator with every plugin that a multirotor's programs use; each test has a vehicle of its own."""
 
 import asyncio
+import json
 import math
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
@@ -10,6 +11,9 @@ from dataclasses import dataclass
 import pytest
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.calibration import CalibrationAsync
+from mavsdk.asyncio.plugins.camera import CameraAsync
+from mavsdk.asyncio.plugins.component_metadata import ComponentMetadataAsync
+from mavsdk.asyncio.plugins.failure import FailureAsync
 from mavsdk.asyncio.plugins.follow_me import FollowMeAsync
 from mavsdk.asyncio.plugins.ftp import FtpAsync
 from mavsdk.asyncio.plugins.geofence import GeofenceAsync
@@ -24,6 +28,9 @@ from mavsdk.mavsdk import Configuration, Mavsdk
 from mavsdk.plugins import mission_raw
 from mavsdk.plugins.action import Action, ActionError, RelayCommand
 from mavsdk.plugins.calibration import CalibrationError
+from mavsdk.plugins.camera import CameraError
+from mavsdk.plugins.component_metadata import ComponentMetadataError, MetadataType
+from mavsdk.plugins.failure import FailureError, FailureType, FailureUnit
 from mavsdk.plugins.follow_me import Config as FollowMeConfig
 from mavsdk.plugins.follow_me import TargetLocation
 from mavsdk.plugins.ftp import FtpError
@@ -48,6 +55,44 @@ from tests.integration.sitl_process import free_instance_base, running_sitl
 pytestmark = [pytest.mark.processes, pytest.mark.slow]
 
 NAN = math.nan
+LATITUDE, LONGITUDE = 47.3977432, 8.5455942
+
+
+def _plan_item(command: int, frame: int, *params: float | None) -> dict:
+    return {"type": "SimpleItem", "autoContinue": True, "command": command, "frame": frame, "params": list(params)}
+
+
+PLAN_FILE = {
+    "fileType": "Plan",
+    "version": 1,
+    "groundStation": "QGroundControl",
+    "geoFence": {
+        "version": 2,
+        "polygons": [],
+        "circles": [
+            {"circle": {"center": [LATITUDE, LONGITUDE], "radius": 300}, "inclusion": True, "version": 1},
+        ],
+    },
+    "mission": {
+        "version": 2,
+        "firmwareType": 12,
+        "vehicleType": 2,
+        "cruiseSpeed": 15,
+        "hoverSpeed": 5,
+        "plannedHomePosition": [LATITUDE, LONGITUDE, 489],
+        "items": [
+            _plan_item(22, 3, 0, 0, 0, None, LATITUDE, LONGITUDE, 5),
+            _plan_item(178, 2, 1, 6, -1, 0, 0, 0, 0),
+            _plan_item(16, 3, 0, 0, 0, None, LATITUDE + 5e-5, LONGITUDE, 5),
+            _plan_item(205, 2, 0, 0, 0, 0, 0, 0, 2),
+            _plan_item(2000, 2, 0, 0, 1, 0, 0, 0, 0),
+            _plan_item(19, 3, 1, 1, 0, None, LATITUDE + 5e-5, LONGITUDE + 5e-5, 5),
+            _plan_item(20, 2, 0, 0, 0, 0, 0, 0, 0),
+        ],
+    },
+    "rallyPoints": {"version": 2, "points": [[LATITUDE + 5e-5, LONGITUDE, 10]]},
+}
+"""A plan as QGroundControl saves it."""
 FENCE_ITEM = mission_raw.MissionItem(0, 5, 5003, 1, 1, 30.0, 0, 0, 0, 473977432, 85455942, 0.0, 1)
 RALLY_ITEM = mission_raw.MissionItem(0, 6, 5100, 1, 1, 0, 0, 0, 0, 473978332, 85455942, 10.0, 2)
 
@@ -55,7 +100,7 @@ RALLY_ITEM = mission_raw.MissionItem(0, 6, 5100, 1, 1, 0, 0, 0, 0, 473978332, 85
 @pytest.fixture(scope="module")
 def base() -> Iterator[int]:
     shift = free_instance_base()
-    with running_sitl("--vehicles", "11", "--speed", "5", base=shift):
+    with running_sitl("--vehicles", "12", "--speed", "5", base=shift):
         yield shift
 
 
@@ -304,6 +349,22 @@ async def test_somebody_is_followed(base):
         await f.in_mode(FlightMode.HOLD)
 
 
+async def test_a_plan_of_qgroundcontrol_is_imported_and_flown(base):
+    """Take-off, speed, waypoint, camera and gimbal items, a wait, and a return to the nearest rally point."""
+    async with flier(base, 12) as f:
+        raw = MissionRawAsync(f.system)
+        plan = await raw.import_qgroundcontrol_mission_from_string(json.dumps(PLAN_FILE))
+        assert (len(plan.mission_items), len(plan.geofence_items), len(plan.rally_items)) == (7, 1, 1)
+        await raw.upload_geofence(plan.geofence_items)
+        await raw.upload_rally_points(plan.rally_items)
+        await raw.upload_mission(plan.mission_items)
+        await f.action.arm()
+        await raw.start_mission()
+        await f.in_mode(FlightMode.MISSION)
+        await f.in_mode(FlightMode.RETURN_TO_LAUNCH)
+        await f.action.kill()
+
+
 async def test_what_is_not_there_is_refused_at_once(base):
     """Files, logs, calibration, relays and a transition are all answered in the time of one message."""
     async with companion(base, 8) as (_, system):
@@ -316,6 +377,10 @@ async def test_what_is_not_there_is_refused_at_once(base):
             (action.set_relay(0, RelayCommand.ON), ActionError, "UNSUPPORTED"),
             (action.transition_to_fixedwing(), ActionError, "NO_VTOL_TRANSITION_SUPPORT"),
             (action.terminate(), ActionError, "COMMAND_DENIED"),
+            (action.shutdown(), ActionError, "UNSUPPORTED"),
+            (CameraAsync(system).take_photo(1), CameraError, "ACTION_UNSUPPORTED"),
+            (FailureAsync(system).inject(FailureUnit.SENSOR_GPS, FailureType.OFF, 0), FailureError, "DISABLED"),
+            (ComponentMetadataAsync(system).get_metadata(1, MetadataType.PARAMETER), ComponentMetadataError, "NOT"),
             (ParamAsync(system).get_param_int("MPC_XY_CRUISE"), ParamError, "WRONG_TYPE"),
         ):
             with pytest.raises(error, match=said):
@@ -332,7 +397,19 @@ async def test_rates_can_be_set_for_all_that_a_px4_streams(base):
         await until(telemetry.health_all_ok)
         await telemetry.set_rate_distance_sensor(5.0)
         await telemetry.set_rate_scaled_imu(5.0)
+        await telemetry.set_rate_actuator_output_status(5.0)
+        await telemetry.set_rate_ground_truth(5.0)
+        await telemetry.set_rate_rc_status(5.0)
         await telemetry.set_rate_battery(25.0)
+        async with asyncio.timeout(10.0):
+            assert (await anext(telemetry.subscribe_distance_sensor())).maximum_distance_m == 100.0
+            assert (await anext(telemetry.subscribe_scaled_imu())).acceleration_frd.down_m_s2 == pytest.approx(
+                -9.8, 0.1
+            )
+            assert (await anext(telemetry.subscribe_actuator_output_status())).active == 16
+            assert (await anext(telemetry.subscribe_ground_truth())).absolute_altitude_m == pytest.approx(
+                489.4, abs=0.1
+            )
         batteries = telemetry.subscribe_battery()
         async with asyncio.timeout(10.0):
             for _ in range(20):

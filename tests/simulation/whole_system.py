@@ -2,8 +2,10 @@
 
 import asyncio
 import functools
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeVar
 
 import msgspec
@@ -12,7 +14,10 @@ import numpy.typing as npt
 
 from companion.app import App
 from companion.fault_injection import FaultInjection
+from companion.fleet.desk import FleetDesk
+from companion.fleet.exchange import Exchange
 from companion.journal import Journal
+from companion.link.fleet_frames import FleetFrames
 from companion.pilot import Pilot
 from companion.planner.planner import Planner
 from companion.settings import CompanionSettings
@@ -118,6 +123,8 @@ class WholeSystem:
         self.station.connections.append(self.wire)
         self.autopilots: dict[int, SimulatedAutopilot] = {}
         self.companions: dict[int, App] = {}
+        self.radio_inboxes: dict[int, deque[bytes]] = {}
+        """What companions have not heard yet of each other's words."""
         self.companion_missions = {vehicle.sysid: self.mission for vehicle in self.mission.vehicles}
         """What each companion has read; tests may give one something else."""
         self.deaths: dict[int, float] = {}
@@ -170,15 +177,17 @@ class WholeSystem:
         rng = np.random.default_rng(self.seed)
         planner = Planner(mission, settings.reserve, settings.search, rng, zones_m)
         autopilot = self.autopilots[vehicle.sysid] = SimulatedAutopilot(self.simulator, vehicle.sysid)
+        fleet = self._fleet_desk(mission, vehicle.sysid)
         companion = App(
             settings,
-            Pilot(mission, settings, planner),
+            Pilot(mission, settings, planner, fleet.exchange),
             planner,
             autopilot,
             _work,
             NoDeadMan(),
             Mortality(self.faults, vehicle.sysid),
             Journal(vehicle.sysid, None, say=lambda _: None),
+            fleet=fleet,
             cpu_clock=lambda: 0.0,
         )
         self.companions[vehicle.sysid] = companion
@@ -187,6 +196,17 @@ class WholeSystem:
         except* Died:
             autopilot.close()
             self.deaths[vehicle.sysid] = self.simulator.time_s
+
+    def _fleet_desk(self, mission: Mission, sysid: int) -> FleetDesk:
+        """A companion's end of the fleet link, in memory."""
+        heard = self.radio_inboxes.setdefault(sysid, deque())
+
+        def poll() -> Iterator[bytes]:
+            while heard:
+                yield heard.popleft()
+
+        frames = FleetFrames(sysid, mission.frame)
+        return FleetDesk(Exchange(sysid, mission), mission, frames, poll, partial(self.simulator.receive_radio, sysid))
 
     async def simulate(self) -> None:
         """Advance the simulator and carry its messages, until cancelled."""
@@ -200,6 +220,9 @@ class WholeSystem:
                     self.station.receive(self.wire, frame, ("simulator", sysid))
                 elif sysid in self.autopilots:
                     self.autopilots[sysid].receive_frame(frame)
+            for sysid, datagram in self.simulator.radio_datagrams():
+                if sysid in self.radio_inboxes:
+                    self.radio_inboxes[sysid].append(datagram)
             self._note_modes()
             await asyncio.sleep(TICK_S)
 

@@ -10,6 +10,7 @@ from companion import instructions
 from companion.briefing import FlightOrder
 from companion.crew import Crew
 from companion.events import Odometry
+from companion.fleet.exchange import Exchange
 from companion.fleet.neighbour import Neighbour
 from companion.flight import Flight
 from companion.planner.planner import Plan, Planner, PlanRequest
@@ -83,9 +84,10 @@ class Craft:
         mission = course.mission
         self.goal_m, self._start_m = course.goals_m[index], course.starts_m[index]
         self.planner = MeasuredPlanner(course, index, seed, search or SearchSettings(), reserve or Reserve())
-        self._crew = Crew(mission, self.planner, PilotSettings(), 1.0)
-        frame = AutopilotFrame(mission.origin, mission.frame)
-        self._order = FlightOrder(1, Track(self.goal_m[None], np.array([np.nan]), (0,)), frame)
+        self.exchange = Exchange(index + 1, mission)
+        self._crew = Crew(mission, self.planner, PilotSettings(), 1.0, self.exchange)
+        self.frame = AutopilotFrame(mission.origin, mission.frame)
+        self._order = FlightOrder(1, Track(self.goal_m[None], np.array([np.nan]), (0,)), self.frame)
         self.flight: Flight | None = None
         self._answers: list[tuple[float, Plan]] = []
         self.notes: list[tuple[float, str]] = []
@@ -95,6 +97,12 @@ class Craft:
         if self.flight is None:
             return Motion(self._start_m, np.zeros(3), np.zeros(3))
         return self.flight.course.motion(now_s)
+
+    def odometry(self, now_s: float) -> Odometry:
+        """What its estimator says: the truth."""
+        motion = self.motion(now_s)
+        ahead_ned_m = self.frame.ned(np.array([motion.position_m, motion.position_m + motion.velocity_m_s]))
+        return Odometry(now_s, ahead_ned_m[0], ahead_ned_m[1] - ahead_ned_m[0], LEVEL)
 
     def eye_m(self, now_s: float) -> Array:
         """(3,) where its sensor is, ENU."""
@@ -112,19 +120,17 @@ class Craft:
         while self._answers and self._answers[0][0] <= now_s:
             _, plan = self._answers.pop(0)
             self._carry_out(self.flight.take(plan, self.planner.plan_ms[-1], now_s), now_s)
-        motion = self.motion(now_s)
-        ahead_ned_m = self._order.frame.ned(np.array([motion.position_m, motion.position_m + motion.velocity_m_s]))
-        self.flight.observe(Odometry(now_s, ahead_ned_m[0], ahead_ned_m[1] - ahead_ned_m[0], LEVEL))
+        self.flight.observe(self.odometry(now_s))
         self._carry_out(self.flight.tick(now_s, 0.0), now_s)
 
     def _begin(self, now_s: float) -> None:
         """Plan from where it stands; fly as soon as there is a plan."""
         guide = self.planner.lay_guide(self._order.track, 0, self._start_m)
-        plan = self.planner.plan(PlanRequest(0, self.motion(now_s), now_s, guide, 0.0))
+        others = self.exchange.neighbours(now_s, pending=True)
+        plan = self.planner.plan(PlanRequest(0, self.motion(now_s), now_s, guide, 0.0, neighbours=others))
         if plan.trajectory is not None:
-            place_ned_m = self._order.frame.ned(self._start_m[None])[0]
-            odometry = Odometry(now_s, place_ned_m, np.zeros(3), LEVEL)
-            self.flight = Flight(self._crew, self._order, plan, odometry, now_s)
+            self.flight = Flight(self._crew, self._order, plan, self.odometry(now_s), now_s)
+            self._carry_out(self.flight.begin(now_s), now_s)
 
     def _carry_out(self, wanted: Iterator[instructions.Instruction], now_s: float) -> None:
         for instruction in wanted:

@@ -62,10 +62,12 @@ ON_THE_GROUND = [
     ((1, 0), 0x00010000, 81),
     ((2, 0), 0x00020000, 81),
     ((3, 0), 0x00030000, 81),
+    ((3, 1), 0x00030000, 81),
     ((3, 2), 0x02030000, 81),
     ((5, 0), 0x00050000, 65),
     ((6, 0), 0x00060000, 1),
     ((7, 0), 0x00070000, 81),
+    ((4, 0), 0x04040000, 29),
     ((4, 2), 0x02040000, 29),
     ((4, 3), 0x03040000, 29),
     ((4, 4), 0x04040000, 29),
@@ -113,6 +115,15 @@ def test_unknown_main_modes_are_taken_without_effect(main):
     flown = Flown().boot()
     assert flown.command(176, 1, main, 0) == ACCEPTED
     assert flown.mode == "HOLD"
+
+
+@pytest.mark.parametrize(
+    ("base_mode", "shown"), [(4, "MISSION"), (64, "MANUAL"), (64 | 16, "STABILIZED"), (64 | 8, "POSITION"), (8, "HOLD")]
+)
+def test_programs_that_know_nothing_of_px4_choose_modes_by_flags(base_mode, shown):
+    flown = Flown().boot()
+    assert flown.command(176, base_mode, 6) == ACCEPTED
+    assert flown.mode == shown
 
 
 def test_the_old_set_mode_message_is_answered_as_a_command():
@@ -164,7 +175,7 @@ def test_landing_disarms_two_seconds_after_it_is_detected_and_goes_back_to_hold(
 
 def test_termination_stops_the_motors_for_good():
     flown = Flown().boot()
-    assert flown.command(185, 1) == DENIED  # on the ground
+    assert flown.command(185, 1) == DENIED  # it is not armed
     flown.take_off(10.0)
     assert flown.command(185, 0) == DENIED
     assert flown.command(185, 1) == ACCEPTED
@@ -173,6 +184,13 @@ def test_termination_stops_the_motors_for_good():
     assert (heartbeat.custom_mode, heartbeat.base_mode, heartbeat.system_status) == (0x000A0000, 129, 8)
     flown.until(lambda: "Disarmed by lockdown" in flown.texts, 6.0)
     assert flown.command(400, 1) == TEMPORARILY_REJECTED
+
+
+def test_whoever_is_armed_can_be_terminated_on_the_ground_too():
+    flown = Flown().boot()
+    flown.command(400, 1)
+    assert flown.command(185, 1) == ACCEPTED
+    assert flown.run(0.1).mode == "TERMINATION"
 
 
 def test_texts_go_to_the_ground_and_never_to_the_companion():

@@ -40,7 +40,7 @@ ON_THE_GROUND = [
     (179, (0, 0, 0, 0, NAN, 8.5, 480.0), DENIED),
     (185, (0,), DENIED),
     (192, (-1, 1, 0, NAN, 47.9, 8.5, 500.0), ACCEPTED),
-    (192, (-1, 0, 0, NAN, 47.9, 8.5, 500.0), ACCEPTED),
+    (192, (-1, 0, 0, NAN, 47.9, 8.5, 500.0), UNSUPPORTED),
     (192, (-1, 1, 0, NAN, 147.9, 8.5, 500.0), DENIED),
     (246, (0,), ACCEPTED),
     (246, (1,), ACCEPTED),
@@ -134,7 +134,7 @@ def test_a_reposition_that_switches_no_mode_counts_only_in_hold(mode, north_m):
     flown = Flown().take_off(4.0)
     flown.command(176, 1, *mode)
     x, y = place(6.0, 0.0)
-    assert flown.command(192, -1, 0, 0, NAN, x * 1e-7, y * 1e-7, 489.4 + 4.0) == ACCEPTED
+    assert flown.command(192, -1, 0, 0, NAN, x * 1e-7, y * 1e-7, 489.4 + 4.0) == UNSUPPORTED
     flown.run(8.0)
     assert flown.position[1] == pytest.approx(north_m, abs=0.2)
 
@@ -386,3 +386,9 @@ def test_parameters_go_back_to_their_defaults_on_the_ground_alone():
     assert flown.simulator.vehicles[1].autopilot.parameters["MIS_TAKEOFF_ALT"] == 2.5
     assert flown.simulator.memories[1].parameters == {}
     assert flown.take_off(6.0).command(245, 2) == TEMPORARILY_REJECTED
+
+
+def test_the_origin_stays_where_it_is_and_is_told_to_who_wants_another():
+    flown = Flown().boot()
+    flown.send(mavlink.MAVLink_set_gps_global_origin_message(1, 400_000_000, 80_000_000, 0, 0))
+    assert flown.last("GPS_GLOBAL_ORIGIN").latitude == pytest.approx(473_977_432, abs=10)

@@ -72,6 +72,17 @@ def test_a_command_reaches_the_companion_and_its_answer_comes_back():
     assert flown.last("COMMAND_ACK").get_srcComponent() == 191
 
 
+def test_sticks_go_from_the_ground_to_the_companion_and_not_back():
+    flown = Flown().boot()
+    sticks = mavlink.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0)
+    for link in Link:
+        flown.send(HEARTBEATS[GCS if link is Link.GROUND else COMPANION], link=link)
+    for link in Link:
+        flown.send(sticks, link=link)
+    assert len(flown.messages("MANUAL_CONTROL", link=Link.ONBOARD)) == 1
+    assert not flown.messages("MANUAL_CONTROL", link=Link.GROUND)
+
+
 def test_a_companion_that_has_not_been_heard_gets_nothing():
     flown = Flown().boot()
     flown.send(mavlink.MAVLink_command_long_message(1, 191, 300, 0, *[0] * 7))

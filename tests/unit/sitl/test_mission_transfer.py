@@ -228,6 +228,34 @@ def test_a_download_gives_back_what_was_uploaded():
     assert flown.last("MISSION_COUNT", link=Link.ONBOARD).opaque_id == flown.last("MISSION_CURRENT").mission_id
 
 
+@pytest.mark.parametrize("frame", [0, 3, 5, 6])
+def test_a_fence_comes_back_above_sea_level(frame):
+    flown = Flown().boot()
+    flown.upload([(frame, 5003, 50.0, 0, 0, 0, *place(0, 0), 10.0)], kind=1)
+    (item,) = download(flown, 1)
+    assert (item.frame, item.autocontinue, item.z) == (5, 0, 10.0)
+
+
+def test_a_polygon_of_two_is_an_error_and_what_follows_belongs_to_nothing():
+    flown = Flown().boot()
+    flown.send(count(2, 1))
+    for seq in range(2):
+        flown.send(item_int(seq, (3, 5001, 2.0, 0, 0, 0, *place(0, 10.0 * seq), 0.0), 1))
+    assert [ack.type for ack in flown.messages("MISSION_ACK")] == [ERROR, ERROR]
+    assert flown.run(0.1).texts[-1] == "IGN MISSION_ITEM: No transfer"
+
+
+@pytest.mark.parametrize(
+    ("command", "result"), [(187, ACCEPTED), (211, ACCEPTED), (3000, ACCEPTED), (183, UNSUPPORTED), (531, UNSUPPORTED)]
+)
+def test_items_for_equipment_are_stored_as_far_as_a_px4_stores_them(command, result):
+    flown = Flown().boot()
+    flown.send(count(2))
+    for seq, item in enumerate([*square(1), (2, command, 1.0, 1.0, 0.0, 0.0, 0, 0, 0.0)]):
+        flown.send(item_int(seq, item))
+    assert flown.last("MISSION_ACK").type == result
+
+
 def test_old_requests_get_old_items():
     flown = Flown().boot()
     flown.upload(square(1))

@@ -84,7 +84,7 @@ def test_every_useful_combination_flies_and_the_others_hold(mask, position, velo
         (0xFF8, 1, "force not supported"),
         (0xDF8, 0, "coordinate frame 0 unsupported"),
         (0xDF8, 9, "coordinate frame 9 unsupported"),
-        (0xDF8, 8, "frame 8"),
+        (0xDF8, 8, "LOCAL_NED invalid"),
     ],
 )
 def test_what_is_no_setpoint_is_refused_and_lets_the_old_one_run_out(mask, frame, text):

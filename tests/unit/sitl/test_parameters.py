@@ -75,6 +75,7 @@ def test_integers_keep_every_bit(value):
         ("MIS_TAKEOFF_ALT", INT32, (1, 1)),
         ("_HASH_CHECK", UINT32, (1, 1)),
         ("MIS_TAKEOFF_ALT", REAL32, (2, 1)),
+        ("MIS_TAKEOFF_ALT", REAL32, (0, 0)),
     ],
 )
 def test_what_px4_does_not_know_it_meets_with_silence(name, kind, target):
