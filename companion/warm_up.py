@@ -21,6 +21,7 @@ def warm_up(planner: Planner, mission: Mission, vehicle: Vehicle) -> None:
     start_m, target_m = mission.start_m(vehicle), np.array(mission.targets[0].position_m)
     _look(planner, mission, start_m)
     guide = planner.lay_guide(Track(np.array([target_m]), np.array([np.nan])), 0, start_m)
+    planner.may_rest(start_m[None])
     way, limits, around = guide.way, planner.limits, planner.around
     way_around(start_m, target_m, 0.0, planner.horizon_m, limits, around)
     straighten(

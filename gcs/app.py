@@ -12,9 +12,11 @@ import msgspec
 from gcs.desk import Desk
 from gcs.errors import GcsError, KeyRingError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
+from gcs.flight.journal import JOURNAL_FILE, JournalKeeper, Story
 from gcs.flight.picture import draw_flight
 from gcs.flight.preflight import origin_here
 from gcs.flight.preparation import CONNECT_TIMEOUT_S
+from gcs.flight.rejoining import rejoin
 from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
@@ -22,10 +24,11 @@ from gcs.flight.trails import Trails
 from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
+from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere
 from gcs.station import Station
-from missions import lidar_packets
+from missions import lidar_packets, ports
 from missions.errors import MissionError
 from missions.faults import format_fault
 from missions.mission import Mission, SensorKind
@@ -51,6 +54,10 @@ class FlightApp:
         events: where everything of note is written.
         work_dir: for the report and the logs of all programs.
         page: serves the web page; None for a headless run, which ends when the flight has ended.
+        story: a flight that was left in the air by a ground station that has crashed: it is gone on with.
+
+    Raises:
+        UsageError: another ground station, alive, flies with this `work_dir`.
     """
 
     def __init__(
@@ -61,10 +68,14 @@ class FlightApp:
         events: EventLog,
         work_dir: Path,
         page: Page | None = None,
+        story: Story | None = None,
     ) -> None:
         self.settings, self.work_dir, self._page = settings, work_dir, page
         self._keys = key_ring(settings, mission, work_dir, events)
-        station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+        self._journal = _journal(work_dir)
+        station = Station(recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None))
+        self._audit = AuditFile(work_dir / AUDIT_FILE)
+        station.audit = Audit(self._audit.write, station.unix_us)
         station.codec.signing = self._keys.signing(station.unix_us)
         flight = FleetFlight(
             station=station,
@@ -76,8 +87,11 @@ class FlightApp:
             unattended=page is None,
         )
         self.flight, self.station, self.events = flight, station, events
+        self._restored = story is not None
+        if story is not None:
+            story.restore(flight)
         simulated = settings.autopilots is Autopilots.SIMULATED
-        self.desk = Desk(station, events, flight, Trails(mission.frame), simulated=simulated)
+        self.desk = Desk(station, events, flight, Trails(flight.mission.frame), simulated=simulated)
         self._security = SecurityWatch(station, events, {vehicle.sysid: vehicle.name for vehicle in mission.vehicles})
         self.report: FlightReport | None = None
         self._first_browser = asyncio.Event()
@@ -98,12 +112,16 @@ class FlightApp:
         except* GcsError as problems:
             reason = str(_first(problems))
             self.events.add("failed", reason, severity=Severity.ERROR)
-        return self.report or self._write_report(reason)
+        try:
+            return self.report or self._write_report(reason)
+        finally:
+            self._journal.close()
 
     async def _run_everything(self) -> None:
         async with AsyncExitStack() as stack:
             assert self.station.recording is not None
             stack.callback(self.station.recording.close)
+            stack.callback(self._audit.close)
             for url in self.settings.ground_links():
                 connection = await open_udp(url, self.station.receive)
                 stack.callback(connection.close)
@@ -131,9 +149,14 @@ class FlightApp:
     async def _fly(self) -> None:
         """The flight, and with a page what the operator does before and after it."""
         try:
-            if self._page is not None:
-                await self._wait_for_browser()
-            await self.desk.fly()
+            if self._restored:
+                await rejoin(self.flight, self.events)
+                await self.flight.watch()
+            else:
+                if self._page is not None:
+                    await self._wait_for_browser()
+                self._journal.begin(self.flight, self.station.unix_us())
+                await self.desk.fly()
             self.report = self._write_report("")
             if self._page is not None:
                 await asyncio.Event().wait()
@@ -149,6 +172,7 @@ class FlightApp:
             await self._leave_holding("interrupted" if cancelled else f"interrupted ({type(ended).__name__})")
             raise
         finally:
+            self._journal.look(self.flight, self.station.unix_us())
             await self.desk.close()
 
     async def _wait_for_browser(self) -> None:
@@ -159,7 +183,7 @@ class FlightApp:
                 await self._first_browser.wait()
 
     async def _leave_holding(self, why: str) -> None:
-        if not self.flight.in_flight:
+        if not self.flight.in_flight or self.flight.passive:
             return
         self.events.add("hold", f"Hold for all vehicles in flight: {why}", severity=Severity.WARNING)
         orders = asyncio.ensure_future(self.flight.hold_all(why))
@@ -186,7 +210,7 @@ class FlightApp:
             options = ["--vehicle", str(vehicle.sysid), "--mission", self.settings.mission]
             options += ["--mode", self.settings.mode.value, "--seed", str(self.settings.seed)]
             options += ["--log", str(self.work_dir / f"{name}.jsonl")]
-            options += self._sensor_options(vehicle.sysid)
+            options += self._sensor_options(vehicle.sysid) + self._fleet_options()
             for fault in self.settings.faults:
                 if fault.vehicle == vehicle.sysid:
                     options += ["--fault", format_fault(fault)]
@@ -200,16 +224,23 @@ class FlightApp:
         address = ["--lidar", f"{settings.lidar_host}:{port}"] if settings.sensor is SensorKind.LIDAR else []
         return ["--sensor", settings.sensor.value, *address]
 
+    def _fleet_options(self) -> list[str]:
+        """How companions of this machine hear each other where no simulator passes their words on."""
+        if self.settings.autopilots is Autopilots.SIMULATED:
+            return []
+        port = ports.FIRST_FLEET_PORT + self.settings.instance_base
+        return ["--fleet-link", f"mcast://{ports.FLEET_GROUP}:{port}/127.0.0.1"]
+
     def _common_options(self) -> list[str]:
         origin = self.flight.mission.origin
         place = f"{origin.latitude_deg!r},{origin.longitude_deg!r},{origin.altitude_amsl_m!r}"
         settings = self.settings
-        ports = ["--speed", f"{settings.speed:g}", "--instance-base", str(settings.instance_base)]
-        return [*ports, "--origin", place, "--supervised"]
+        shared = ["--speed", f"{settings.speed:g}", "--instance-base", str(settings.instance_base)]
+        return [*shared, "--origin", place, "--supervised"]
 
     async def _settle_origin(self) -> None:
         """With `--origin here`, move the mission to where its first vehicle stands."""
-        if self.settings.origin is not OriginHere.HERE:
+        if self.settings.origin is not OriginHere.HERE or self._restored:
             return
         mission, vehicles = self.flight.mission, self.station.fleet.vehicles
         first = mission.vehicles[0]
@@ -242,6 +273,7 @@ class FlightApp:
             self.desk.trails.sample(self.station.fleet, offsets_m)
             self.desk.collect_texts()
             self._security.look(self.station.now_s)
+            self._journal.look(self.flight, self.station.unix_us())
             await asyncio.sleep(TRAIL_INTERVAL_S / self.settings.speed)
 
     def _write_report(self, reason: str) -> FlightReport:
@@ -254,6 +286,8 @@ class FlightApp:
         names = {vehicle.sysid: vehicle.name for vehicle in self.flight.mission.vehicles}
         tracks = {names[sysid]: part.in_flight().positions_m for sysid, part in flown.items() if sysid in names}
         draw_flight(self.work_dir / "flight.png", self.flight.mission, self.flight.plan, tracks)
+        self._journal.look(self.flight, self.station.unix_us())
+        self._journal.end(report.success, self.station.unix_us())
         return report
 
     def _flown(self) -> dict[int, Flown]:
@@ -283,6 +317,13 @@ def key_ring(settings: FlightSettings, mission: Mission, work_dir: Path, events:
         ring = KeyRing(work_dir / "keys")
         ring.ensure(sysids)
     return ring
+
+
+def _journal(work_dir: Path) -> JournalKeeper:
+    try:
+        return JournalKeeper(work_dir / JOURNAL_FILE)
+    except BlockingIOError:
+        raise UsageError(f"{work_dir}: another ground station is flying with this folder") from None
 
 
 def _first(group: BaseExceptionGroup) -> BaseException:

@@ -1,12 +1,11 @@
 """The command line of the ground station: `gcs fly`, `gcs plan`, `gcs check`, `gcs watch`, `gcs experiment`."""
 
 import asyncio
-import contextlib
 import signal
 import sys
-import tempfile
 import time
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,8 +13,12 @@ import typer
 
 from gcs import settings as chosen
 from gcs.commands.convert import convert
+from gcs.commands.key import app as key_app
+from gcs.commands.plan_flight import GivenPlanner, is_plan_file, kept_mission, settings_and_plan
+from gcs.commands.plan_output import check_output, write_plan
 from gcs.commands.replay import replay
 from gcs.errors import GcsError, UsageError
+from gcs.folders import flights_folder, new_flight_folder
 from gcs.link.url import parse_link_url
 from missions.errors import MissionError
 from missions.faults import EXAMPLES as FAULT_EXAMPLES
@@ -26,7 +29,9 @@ from missions.mission import Mission, SensorKind, load_mission, shipped_missions
 if TYPE_CHECKING:
     from gcs.desk import Desk
     from gcs.flight.events import EventLog
+    from gcs.flight.journal import Story
     from gcs.flight.report import FlightReport
+    from gcs.planner.plan import FleetPlan
     from gcs.planner_process import PlannerProcess
 
 BAD_INPUT = 2
@@ -80,10 +85,13 @@ def fly(
     ] = "127.0.0.1",
     instance_base: InstanceOption = 0,
     keys: KeysOption = None,
+    vehicle: Annotated[int, typer.Option(min=1, max=250, help="who flies a .plan: a system id")] = 1,
 ) -> None:
-    """Fly a mission.
+    """Fly a mission, or a plan of another tool (.plan, .waypoints; by the autopilot alone).
 
     Examples:
+
+        gcs fly survey.plan --vehicle 3 --link udpin://0.0.0.0:14550
 
         gcs fly indoor --sim                                  on the bundled simulator, with the web page
 
@@ -123,6 +131,8 @@ def fly(
         sensor=sensor,
         lidar_host=lidar_host,
     )
+    if is_plan_file(mission):
+        raise typer.Exit(_run_flight(*settings_and_plan(settings, vehicle)))
     raise typer.Exit(_run_flight(settings, load_mission(mission)))
 
 
@@ -133,7 +143,9 @@ def plan(
     seed: SeedOption = 0,
     evaluations: Annotated[int | None, typer.Option(min=1, help="stop after so many evaluations")] = None,
     budget_s: Annotated[float | None, typer.Option("--budget-s", min=0.001, help="stop after so much time")] = None,
-    output: Annotated[Path | None, typer.Option(metavar="FILE", help="where the plan goes, as .json")] = None,
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="where the plan goes: .json, .plan or .waypoints")
+    ] = None,
 ) -> None:
     """Plan a mission and say what came out; nothing is sent to any vehicle.
 
@@ -142,9 +154,11 @@ def plan(
         gcs plan terrain-1-5uav --seed 3 --output plan.json
 
         gcs plan indoor --algorithm pso --evaluations 3000
+
+        gcs plan indoor --output indoor.plan      for QGroundControl: indoor-alpha.plan, indoor-bravo.plan
     """
     if output is not None:
-        _check_output(output)
+        check_output(output)
     from rich.console import Console
 
     from gcs.console import PlanConsole, print_plan
@@ -162,7 +176,8 @@ def plan(
         )
     print_plan(console, found)
     if output is not None:
-        _write(output, found.to_json())
+        for line in write_plan(output, loaded, found):
+            console.print(line, markup=False)
     raise typer.Exit(0 if found.feasible else 1)
 
 
@@ -198,15 +213,17 @@ def watch(
         gcs watch --link udpin://0.0.0.0:14550
     """
     from gcs.console import FlightConsole
-    from gcs.flight.events import EventLog
+    from gcs.flight.events import BEGAN, EventLog
     from gcs.view.server import serve_page
     from gcs.watch import watch as run_watch
 
     settings = chosen.FlightSettings(mission="", links=tuple(parse_link_url(text) for text in link or ()), keys=keys)
-    console = FlightConsole()
-    events = EventLog(time.monotonic, listeners=[console.show])
+    console, work_dir = FlightConsole(), _work_dir(None, "watch")
+    events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
+    events.add(BEGAN, "gcs watch", unix_us=time.time_ns() // 1000)
+    console.say(f"recorded in {work_dir}")
     console.say(f"page: http://127.0.0.1:{port}")
-    asyncio.run(run_watch(settings, events, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
+    asyncio.run(run_watch(settings, events, work_dir, lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))
 
 
 @app.command()
@@ -268,6 +285,7 @@ def missions() -> None:
 
 app.command()(convert)
 app.command()(replay)
+app.add_typer(key_app, name="key")
 
 
 def main() -> None:
@@ -285,29 +303,40 @@ def main() -> None:
         sys.exit(130)
 
 
-def _run_flight(settings: chosen.FlightSettings, mission: Mission) -> int:
+def _run_flight(settings: chosen.FlightSettings, mission: Mission, given: "FleetPlan | None" = None) -> int:
     from gcs.console import FlightConsole, PlanConsole
     from gcs.flight.events import BEGAN, EventLog
+    from gcs.flight.rejoining import left_in_flight, unfinished
     from gcs.planner_process import PlannerProcess
 
     if isinstance(settings.origin, GeodeticPoint):
         mission = mission.moved_to(settings.origin)
     console = FlightConsole()
-    with _work_dir(settings.report_dir) as work_dir, PlanConsole(console.console) as progress:
-        events = EventLog(time.monotonic, work_dir / "events.jsonl", listeners=[console.show])
+    left = left_in_flight(flights_folder(), mission) if settings.report_dir is None and not settings.simulated else None
+    work_dir = left or _work_dir(settings.report_dir, mission.name)
+    story = None if settings.simulated else unfinished(work_dir, mission)
+    with PlanConsole(console.console) as progress:
+        events = EventLog(time.monotonic, work_dir / "events.jsonl", [], [console.show], keep=story is not None)
         events.add(BEGAN, f"gcs fly {settings.mission}", unix_us=time.time_ns() // 1000)
-        with PlannerProcess("ecpso", settings.seed, [progress.show]) as planner:
-            report = asyncio.run(_fly(settings, mission, planner, events, work_dir))
+        if given is not None:
+            settings = kept_mission(settings, mission, work_dir)
+        with PlannerProcess("ecpso", settings.seed, [progress.show]) as process:
+            planner = process if given is None else GivenPlanner(given)
+            report = asyncio.run(_fly(settings, mission, planner, events, work_dir, story))
         events.close()
     verdict = "success" if report.success else "FAILED"
     console.say(f"{verdict}: {report.reason}", style="green" if report.success else "bold red")
-    if settings.report_dir is not None:
-        console.say(f"report: {settings.report_dir / 'report.json'}")
+    console.say(f"report: {work_dir / 'report.json'}")
     return 0 if report.success else 1
 
 
 async def _fly(
-    settings: chosen.FlightSettings, mission: Mission, planner: "PlannerProcess", events: "EventLog", work_dir: Path
+    settings: chosen.FlightSettings,
+    mission: Mission,
+    planner: "PlannerProcess | GivenPlanner",
+    events: "EventLog",
+    work_dir: Path,
+    story: "Story | None",
 ) -> "FlightReport":
     from gcs.app import FlightApp
     from gcs.view.server import serve_page
@@ -315,23 +344,20 @@ async def _fly(
     def page(desk: "Desk", first_browser: asyncio.Event) -> Coroutine[None, None, None]:
         return serve_page(desk, settings.host, settings.port, first_browser)
 
-    app = FlightApp(settings, mission, planner.plan, events, work_dir, None if settings.headless else page)
+    app = FlightApp(settings, mission, planner.plan, events, work_dir, None if settings.headless else page, story)
     planner.on_progress.append(app.desk.on_plan_progress)
     return await app.run()
 
 
-@contextlib.contextmanager
-def _work_dir(report_dir: Path | None) -> Iterator[Path]:
-    """The report's directory, or one that is thrown away."""
-    if report_dir is None:
-        with tempfile.TemporaryDirectory(prefix="gcs-") as scratch:
-            yield Path(scratch)
-        return
+def _work_dir(report_dir: Path | None, name: str) -> Path:
+    """The report's directory, or one among all flights, which are kept."""
     try:
+        if report_dir is None:
+            return new_flight_folder(name, datetime.now(UTC))
         report_dir.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise UsageError(f"--report {report_dir}: cannot be made: {problem.strerror}") from None
-    yield report_dir
+        raise UsageError(f"{report_dir or flights_folder()}: cannot be made: {problem.strerror} (--report)") from None
+    return report_dir
 
 
 def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
@@ -340,21 +366,6 @@ def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
     if text == "here":
         return chosen.OriginHere.HERE
     return parse_origin(text)
-
-
-def _check_output(path: Path) -> None:
-    """Refuse what cannot be written before anything is worked out."""
-    if path.suffix != ".json":
-        raise UsageError(f"--output {path}: expected a name that ends in .json")
-    if not path.parent.is_dir():
-        raise UsageError(f"--output {path}: cannot be written: {path.parent} is no directory")
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text)
-    except OSError as problem:
-        raise UsageError(f"--output {path}: cannot be written: {problem.strerror}") from None
 
 
 def _as_interrupt(*_: object) -> None:

@@ -22,6 +22,7 @@ from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.command_client import CommandClient
 from gcs.planner.plan import Progress
 from gcs.replay.player import Player
+from gcs.security.audit import Origin, acting_as
 from gcs.station import Station
 from missions.errors import MissionError
 from missions.mission import Mission
@@ -140,7 +141,8 @@ class Desk:
     async def _perform(self, intent: Intent, sysids: list[int]) -> None:
         try:
             if intent.concerns_vehicles:
-                await asyncio.gather(*(self._order(intent, sysid) for sysid in sysids))
+                with acting_as(Origin.OPERATOR):
+                    await asyncio.gather(*(self._order(intent, sysid) for sysid in sysids))
             else:
                 await self._step(intent, self._fleet_step(intent))
         except (GcsError, MissionError) as problem:

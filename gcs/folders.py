@@ -1,6 +1,7 @@
 """Where the ground station keeps what outlasts a flight: keys, and recordings (the XDG base directories)."""
 
 import os
+from datetime import datetime
 from pathlib import Path
 
 NAME = "end-cloud-gcs"
@@ -14,6 +15,23 @@ def key_folder(ring: str) -> Path:
 def flights_folder() -> Path:
     """Of the flights that were given no `--report`."""
     return _base("XDG_STATE_HOME", ".local/state") / NAME / "flights"
+
+
+def new_flight_folder(name: str, began: datetime) -> Path:
+    """Make a folder for one flight, named after when it began.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    stem = f"{began:%Y-%m-%dT%H-%M-%S}-{name}"
+    for number in range(1, 1000):
+        folder = flights_folder() / (stem if number == 1 else f"{stem}-{number}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        return folder
+    raise FileExistsError(f"{flights_folder() / stem} and 998 others")
 
 
 def _base(variable: str, otherwise: str) -> Path:

@@ -71,6 +71,10 @@ class FlightSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Where the companions that are started hear their lidars."""
 
     @property
+    def simulated(self) -> bool:
+        return self.autopilots is Autopilots.SIMULATED
+
+    @property
     def starts_companions(self) -> bool:
         return self.mode.needs_companions and self.autopilots is not Autopilots.ATTACHED
 

@@ -17,6 +17,7 @@ from gcs.fleet.vehicle_state import VehicleState
 from gcs.link.codec import Codec
 from gcs.link.tlog import TlogWriter
 from gcs.microservices import Microservice
+from gcs.security.audit import Audit
 
 HEARTBEAT_INTERVAL_S = 1.0
 
@@ -44,10 +45,12 @@ class Station:
 
     Args:
         recording: where all frames, received and sent, are written.
+        audit: where all orders and their results are written.
         unix_us: the wall clock for the recording's stamps.
     """
 
     recording: TlogWriter | None = None
+    audit: Audit | None = None
     unix_us: Callable[[], int] = lambda: time.time_ns() // 1000
     fleet: Fleet = field(default_factory=Fleet)
     codec: Codec = field(default_factory=Codec)
@@ -72,6 +75,8 @@ class Station:
             self.fleet.fold(message, now_s)
             if not self._is_for_us(message):
                 continue
+            if self.audit is not None:
+                self.audit.received(message)
             for inbox in self._inboxes.get(source, ()):
                 if message.get_type() in inbox.wants:
                     inbox.queue.put_nowait(message)
@@ -157,6 +162,8 @@ class Station:
             self.send(message, sysid)
 
     def _transmit(self, message: Message, connection: Connection, address: Address, sysid: int) -> None:
+        if self.audit is not None:
+            self.audit.sent(message, sysid)
         frame = self.codec.pack(message, sysid)
         if self.recording is not None:
             self.recording.write(frame, self.unix_us())

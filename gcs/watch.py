@@ -2,29 +2,37 @@
 
 import asyncio
 from contextlib import AsyncExitStack
+from pathlib import Path
 
 from gcs.app import TRAIL_INTERVAL_S, Page
 from gcs.desk import Desk
 from gcs.flight.events import EventLog
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.trails import Trails
+from gcs.link.tlog import TlogWriter
 from gcs.link.udp import open_udp
+from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
 from gcs.settings import FlightSettings
 from gcs.station import Station
 from missions.frames import LocalFrame
 
 
-async def watch(settings: FlightSettings, events: EventLog, page: Page) -> None:
-    """Serve the page until cancelled.
+async def watch(settings: FlightSettings, events: EventLog, work_dir: Path, page: Page) -> None:
+    """Serve the page until cancelled; everything is recorded in `work_dir`.
 
     Raises:
         UsageError: a port in use, or a key ring that cannot be used.
     """
-    station = Station()
+    audit = AuditFile(work_dir / AUDIT_FILE)
+    station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+    station.audit = Audit(audit.write, station.unix_us)
     station.codec.signing = KeyRing(settings.key_folder()).signing(station.unix_us)
     desk = Desk(station, events)
     async with AsyncExitStack() as stack:
+        assert station.recording is not None
+        stack.callback(station.recording.close)
+        stack.callback(audit.close)
         for url in settings.ground_links():
             connection = await open_udp(url, station.receive)
             stack.callback(connection.close)

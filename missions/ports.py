@@ -7,6 +7,8 @@ FIRST_ONBOARD_PORT = 14580
 FURTHER_ONBOARD_PORT = 15300
 """Of vehicle 121: the ports of the first 120 end before those of the fleet link."""
 FIRST_FLEET_PORT = 14700
+FLEET_GROUP = "239.255.145.50"
+"""The multicast group in which companions hear each other without a relay."""
 RADIO_PORT = 14980
 """Where the simulator hears what companions say to each other."""
 

@@ -181,7 +181,8 @@ class Roster:
             self.dropped["overtaken"] += 1
             return
         known.position, known.position_s = report, at_s
-        self.changes += 1
+        if known.flown is None or not self._flies(known.flown, known, now_s):
+            self.changes += 1
 
     def _note(self, known: Known, message: TrajectoryMessage, now_s: float, ahead_s: float) -> None:
         lag_s = max(now_s + ahead_s - message.announced_s - message.age_s, 0.0)

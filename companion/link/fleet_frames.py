@@ -59,13 +59,10 @@ class FleetFrames:
         if len(datagram) > LARGEST_DATAGRAM_BYTES or datagram[:1] != bytes([MAVLINK_2]):
             self.dropped["no frame"] += 1
             return
-        try:
-            messages = self._reader.parse_buffer(bytearray(datagram)) or []
-        except Exception:  # the parser raises whatever its input makes it raise
+        messages = self._reader.parse_buffer(bytearray(datagram)) or []
+        if self._reader.buf_len():  # a frame that its datagram cut off must not eat the next one
             self.dropped["no frame"] += 1
-            self._reader = mavlink.MAVLink(None)
-            self._reader.robust_parsing = True
-            return
+            self._reader.buf, self._reader.buf_index = bytearray(), 0
         for message in messages:
             report = self._read_one(message)
             if report is not None:

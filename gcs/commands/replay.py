@@ -31,6 +31,7 @@ def replay(
     if not LEAST_SPEED <= speed <= GREATEST_SPEED:
         raise UsageError(f"--speed {speed:g}: expected {LEAST_SPEED:g} to {GREATEST_SPEED:g}")
     from gcs.console import FlightConsole
+    from gcs.flight.journal import JOURNAL_FILE, read_story
     from gcs.flight.told import read_told
     from gcs.replay.player import Player
     from gcs.replay.recording import read_recording
@@ -47,6 +48,7 @@ def replay(
     player.set_speed(speed)
     player.seek(seek)
     player.play()
-    session = ReplaySession(player, read_told(flight.with_name("events.jsonl"), recording))
+    story = read_story(flight.with_name(JOURNAL_FILE))
+    session = ReplaySession(player, read_told(flight.with_name("events.jsonl"), recording), story)
     console.say(f"page: http://127.0.0.1:{port}")
     asyncio.run(session.run(lambda desk, first: serve_page(desk, "127.0.0.1", port, first)))

@@ -50,7 +50,9 @@ def shapes_of(document: PlanDocument) -> Iterator[Shape]:
     for polygon in document.polygons:
         yield _area(polygon.name or _fence_name(polygon.inclusion), polygon.corners, polygon.inclusion)
     for circle in document.circles:
-        yield _area(f"{_fence_name(circle.inclusion)}, r = {circle.radius_m:g} m", _round(circle), circle.inclusion)
+        yield _area(
+            f"{_fence_name(circle.inclusion)}, r = {circle.radius_m:g} m", circle_corners(circle), circle.inclusion
+        )
     home_m = document.home.altitude_amsl_m if document.home is not None else 0.0
     for number, rally in enumerate(document.rally, start=1):
         yield Shape(ShapeKind.RALLY, f"rally point {number}", (_point(rally.place, home_m + rally.height_m),))
@@ -75,7 +77,7 @@ def _area(name: str, corners: Sequence[Place], inclusion: bool) -> Shape:
     return Shape(ShapeKind.FENCE, name, tuple(_point(corner, 0.0) for corner in ring), True, inclusion)
 
 
-def _round(circle: Circle) -> list[Place]:
+def circle_corners(circle: Circle) -> list[Place]:
     """A circle's corners, outside of it where it must not be entered."""
     angles = np.linspace(0.0, 2.0 * np.pi, CIRCLE_CORNERS, endpoint=False)
     grown = 1.0 if circle.inclusion else 1.0 / np.cos(np.pi / CIRCLE_CORNERS)

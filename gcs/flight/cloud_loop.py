@@ -21,6 +21,7 @@ from gcs.planner.curves import lengths
 from gcs.planner.plan import FleetPlan, VehiclePlan
 from gcs.replanning.remaining import Aloft, remaining_mission
 from gcs.replanning.replanner import Cause, Replanner
+from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
 from missions.errors import MissionError
 from missions.mission import Mission
@@ -75,7 +76,8 @@ class CloudLoop:
             aloft = list(self._aloft())
             cause = self.replanner.look(aloft, self._now_s)
             if cause is not None:
-                await self._replan(cause, aloft)
+                with acting_as(Origin.REPLANNER):
+                    await self._replan(cause, aloft)
             await asyncio.sleep(LOOK_INTERVAL_S / self.flight.speed)
 
     @property

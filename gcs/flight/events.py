@@ -41,16 +41,18 @@ class EventLog:
     Args:
         clock: seconds on a monotonic clock.
         path: where the JSON lines go, or None.
+        keep: go on with what is there; otherwise it is begun anew.
     """
 
     clock: Callable[[], float]
     path: Path | None = None
     events: list[Event] = field(default_factory=list)
     listeners: list[Callable[[Event], None]] = field(default_factory=list)
+    keep: bool = False
 
     def __post_init__(self) -> None:
         self._started_s = self.clock()
-        self._file: TextIO | None = self.path.open("w", buffering=1) if self.path else None
+        self._file: TextIO | None = self.path.open("a" if self.keep else "w", buffering=1) if self.path else None
 
     def add(
         self, kind: str, text: str, vehicle: str | None = None, severity: Severity = Severity.INFO, **data: Any

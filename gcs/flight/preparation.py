@@ -95,16 +95,26 @@ class Preparation:
         state = self._state(flight)
         offset_m = preflight.ground_offset_m(state, flight.vehicle, self.mission)
         flight.monitor.ground_offset_m = offset_m
-        assert flight.plan is not None
-        flight.take_items(mission_items(flight.plan, self.mission, self.mode, offset_m), self.mission)
-        fence = fence_items(self.mission, curves_m)
-        await upload.store(self.station, flight.sysid, fence, FENCE)
-        await upload.store(self.station, flight.sysid, flight.items)
-        text = f"{len(flight.items)} mission items and {len(fence)} fence items stored and read back"
+        fence = await self._store(flight, curves_m)
+        text = f"{len(flight.items)} mission items and {fence} fence items stored and read back"
         self.events.add("uploaded", text, flight.name, plan_id=plan_id(flight.items), ground_offset_m=offset_m)
         if self.mode.needs_companions:
             await self._companion_ready(flight)
         flight.monitor.phase = Phase.PREPARED
+
+    async def _store(self, flight: VehicleFlight, curves_m: Sequence[Array]) -> int:
+        """Store the mission, and what belongs to it; how many items the fence has."""
+        assert flight.plan is not None
+        given, offset_m = flight.plan.given, flight.monitor.ground_offset_m
+        if given is None:
+            flight.take_items(mission_items(flight.plan, self.mission, self.mode, offset_m), self.mission)
+            fence = fence_items(self.mission, curves_m)
+        else:
+            flight.items, fence = given.items, given.fence
+            await upload.store(self.station, flight.sysid, given.rally, mavlink.MAV_MISSION_TYPE_RALLY)
+        await upload.store(self.station, flight.sysid, fence, FENCE)
+        await upload.store(self.station, flight.sysid, flight.items)
+        return len(fence)
 
     def _state(self, flight: VehicleFlight) -> VehicleState:
         return self.station.vehicle(flight.sysid)

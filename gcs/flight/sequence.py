@@ -21,6 +21,7 @@ from gcs.flight.route import RouteWatch
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.flight.vehicle_orders import VehicleOrders
 from gcs.planner.plan import FleetPlan, VehiclePlan
+from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.mission import Mission
@@ -54,6 +55,8 @@ class FleetFlight:
     events: EventLog
     speed: float = 1.0
     unattended: bool = True
+    passive: bool = False
+    """Nothing is commanded but what an operator orders: after a restart in flight."""
     plan: FleetPlan | None = None
     vehicles: dict[int, VehicleFlight] = field(default_factory=dict)
 
@@ -166,7 +169,7 @@ class FleetFlight:
     async def watch(self) -> None:
         """Follow the flight until no vehicle is in flight any more; replan it meanwhile where both sides plan."""
         async with asyncio.TaskGroup() as orders:
-            replanning = orders.create_task(self.cloud.run(), name="replanning")
+            replanning = orders.create_task(self._replan(), name="replanning")
             while self.in_flight:
                 for flight in self.in_flight:
                     self._watch_one(flight, orders)
@@ -225,12 +228,20 @@ class FleetFlight:
             severity = Severity.INFO if flight.monitor.reached or not flight.monitor.reason else Severity.WARNING
             text = f"{before.value} -> {flight.monitor.phase.value}: {flight.monitor.reason}".rstrip(": ")
             self.events.add("phase", text, flight.name, severity, phase=flight.monitor.phase.value)
-        if order is not None:
+        if order is not None and self.passive:
+            text = f"advised: {order.name.lower()}; after a restart nothing is commanded without an order"
+            self.events.add("advice", text, flight.name, Severity.WARNING)
+        elif order is not None:
             orders.create_task(self._order(flight, order), name=f"{order.name} to {flight.name}")
+
+    async def _replan(self) -> None:
+        if not self.passive:
+            await self.cloud.run()
 
     async def _order(self, flight: VehicleFlight, mode: Mode) -> None:
         try:
-            await self.orders.command(flight, actions.set_mode(mode))
+            with acting_as(Origin.MONITOR):
+                await self.orders.command(flight, actions.set_mode(mode))
         except (CommandRefused, LinkLost) as problem:
             self.events.add("refused", str(problem), flight.name, Severity.ERROR)
 

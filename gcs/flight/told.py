@@ -38,11 +38,16 @@ def read_told(path: Path, recording: Recording) -> Told:
     except OSError:
         return said_by_vehicles(recording)
     events, unreadable = _decoded(lines)
-    began_us = next((event.data.get("unix_us") for event in events if event.kind == BEGAN), None)
-    if not isinstance(began_us, int):
+    late_s: float | None = None
+    moved: list[Event] = []
+    for event in events:
+        began_us = event.data.get("unix_us")
+        if event.kind == BEGAN and isinstance(began_us, int):  # once, and again after each restart
+            late_s = (began_us - recording.began_unix_us) / 1e6
+        if late_s is not None:
+            moved.append(msgspec.structs.replace(event, t_s=event.t_s + late_s))
+    if not moved:
         return said_by_vehicles(recording)
-    late_s = (began_us - recording.began_unix_us) / 1e6
-    moved = [msgspec.structs.replace(event, t_s=event.t_s + late_s) for event in events]
     return Told(tuple(sorted(moved, key=lambda event: event.t_s)), unreadable)
 
 

@@ -10,10 +10,15 @@ _STAMP = struct.Struct(">Q")
 
 
 class TlogWriter:
-    """Appends frames to a recording."""
+    """Appends frames to a recording.
 
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("wb")
+    Args:
+        path: the file.
+        keep: go on with what is there; otherwise it is begun anew.
+    """
+
+    def __init__(self, path: Path, *, keep: bool = False) -> None:
+        self._file = path.open("ab" if keep else "wb")
 
     def write(self, frame: bytes | bytearray, unix_us: int) -> None:
         self._file.write(_STAMP.pack(unix_us) + frame)

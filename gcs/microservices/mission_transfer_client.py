@@ -32,7 +32,7 @@ with ERROR, also while the present transfer is going well. What counts is whethe
 
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
-_KIND_NAMES = {MISSION: "mission", FENCE: "fence"}
+_KIND_NAMES = {MISSION: "mission", FENCE: "fence", mavlink.MAV_MISSION_TYPE_RALLY: "rally point"}
 
 
 def _patience() -> Backoff:

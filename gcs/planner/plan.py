@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from missions.mission import Target
-from missions.mission_items import Track
+from missions.mission_items import MissionItem, Track
 
 Array = npt.NDArray[np.float64]
 
@@ -125,16 +125,27 @@ class TimedCurve:
 
 
 @dataclass(frozen=True)
+class GivenItems:
+    """What another tool has planned, to be stored on the vehicle as it is: mission, fence and rally points."""
+
+    items: tuple[MissionItem, ...]
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
+
+
+@dataclass(frozen=True)
 class VehiclePlan(TimedCurve):
     """One vehicle's part of a plan.
 
     Args:
         track: the points and speeds that autopilot and companion are given.
         length_m: of the curve.
+        given: instead of items made from the track.
     """
 
     track: Track
     length_m: float
+    given: GivenItems | None = None
 
     @property
     def targets_alone(self) -> Track:

@@ -140,6 +140,11 @@ class Autopilot:
     def set_mission(self, plan: Plan) -> None:
         """Store a mission; whether it can be flown is found out at once, and said."""
         self._memory.mission = plan
+        craft, item = self.craft, plan.landing
+        craft.mission_landing = None
+        if item is not None:
+            altitude_m = altitude_amsl_m(item, craft.home_altitude_m)
+            craft.mission_landing = craft.frame.local(latitude_deg(item), longitude_deg(item), altitude_m)
         self.navigator.set_mission(plan)
         self._check_mission()
 

@@ -29,6 +29,8 @@ class Craft:
     position_valid: bool = True
     """Whether the vehicle knows where it is."""
     rally_points: tuple[LocalPoint, ...] = ()
+    mission_landing: LocalPoint | None = None
+    """Where the mission's own landing is, if it has one to return to."""
     region_of_interest: LocalPoint | None = None
     """Where auto modes turn the nose to."""
 

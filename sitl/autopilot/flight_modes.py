@@ -199,10 +199,12 @@ class Return:
         return False
 
     def _choose_destination(self, s: Snapshot) -> None:
-        """RTL_TYPE 0: what is nearest of home and the rally points; 1: of the rally points, if there are any."""
+        """What is nearest of the places that RTL_TYPE allows; home if there are none."""
         craft = self._craft
-        without_home = craft.parameters["RTL_TYPE"] > 0 and craft.rally_points
-        places = craft.rally_points if without_home else (craft.home, *craft.rally_points)
+        home, rally = (craft.home,), craft.rally_points
+        landing = () if craft.mission_landing is None else (craft.mission_landing,)
+        allowed = {0: home + rally, 1: rally + landing, 2: landing, 3: home + rally + landing}
+        places = allowed[int(craft.parameters["RTL_TYPE"])] or home
         self._destination = min(places, key=lambda place: distance_m(s, place))
         self._yaw_rad = craft.home_yaw_rad if self._destination is craft.home else NAN
 

@@ -121,7 +121,7 @@ _SAFETY = (
     Parameter("FD_FAIL_P_TTRI", 0.3, 0.02, 5.0),
     Parameter("FD_FAIL_R", 60, 0, 180),
     Parameter("FD_FAIL_R_TTRI", 0.3, 0.02, 5.0),
-    Parameter("RTL_TYPE", 0, 0, 1),
+    Parameter("RTL_TYPE", 0, 0, 3),
     Parameter("RTL_RETURN_ALT", 30.0, 0.0, 1000.0),
     Parameter("RTL_DESCEND_ALT", 10.0, 0.0, 1000.0),
     Parameter("RTL_LAND_DELAY", 0.0, -1.0, 3600.0),

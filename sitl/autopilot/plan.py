@@ -83,6 +83,15 @@ class Plan:
         """CRC-32 over all content; equal plans have equal ids, and nothing has 0."""
         return zlib.crc32(b"".join(_content(self.items))) if self.items else 0
 
+    @cached_property
+    def landing(self) -> MissionItem | None:
+        """Where the landing that begins with a DO_LAND_START ends."""
+        commands = [item.command for item in self.items]
+        if Cmd.DO_LAND_START not in commands:
+            return None
+        begin = commands.index(Cmd.DO_LAND_START)
+        return next((item for item in self.items[begin:] if item.command == Cmd.NAV_LAND and has_place(item)), None)
+
 
 def _content(items: Sequence[MissionItem]) -> Iterator[bytes]:
     for i in items:

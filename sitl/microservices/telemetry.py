@@ -190,10 +190,9 @@ def attitude_quaternion(m: Moment) -> tuple:
     return m.time_boot_ms, s.qw, s.qx, s.qy, s.qz, s.p_rad_s, s.q_rad_s, s.r_rad_s, (0.0,) * 4
 
 
-def local_position_ned(m: Moment) -> tuple | None:
+def local_position_ned(m: Moment) -> tuple:
+    """Where it believes to be, also when it only reckons: a PX4 goes on to say so."""
     s = m.s
-    if not m.autopilot.craft.position_valid:
-        return None
     return m.time_boot_ms, s.x_m, s.y_m, s.z_m, s.vx_m_s, s.vy_m_s, s.vz_m_s
 
 
@@ -210,10 +209,8 @@ def odometry(m: Moment) -> tuple:
     return m.time_us, ned, ned, *pose, *motion, pose_covariance, velocity_covariance, 0, autopilot, 0
 
 
-def global_position_int(m: Moment) -> tuple | None:
+def global_position_int(m: Moment) -> tuple:
     s = m.s
-    if not m.autopilot.craft.position_valid:
-        return None
     place = e7(s.latitude_deg), e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
     velocity = round(s.vx_m_s * 100.0), round(s.vy_m_s * 100.0), round(s.vz_m_s * 100.0)
     return m.time_boot_ms, *place, *velocity, round(_heading_deg(s.yaw_rad) * 100.0) % 36000
@@ -222,7 +219,7 @@ def global_position_int(m: Moment) -> tuple | None:
 def gps_raw_int(m: Moment) -> tuple:
     s = m.s
     if s.dead_reckoning:
-        return m.time_us, 1, 0, 0, 0, 65535, 65535, 65535, 65535, 0, 0, 0, 0, 0, 0, 0
+        return m.time_us, 0, 0, 0, 0, 65535, 65535, 65535, 65535, 0, 0, 0, 0, 0, 0, 0
     altitude_mm = round(s.altitude_m * 1e3)
     course = round(_heading_deg(math.atan2(s.vy_m_s, s.vx_m_s)) * 100.0) % 36000
     place = e7(s.latitude_deg), e7(s.longitude_deg), altitude_mm

@@ -89,3 +89,13 @@ def test_bad_input_ends_with_a_sentence_and_code_2(arguments: tuple[str, ...], s
     assert finished.code == 2, finished.output
     assert says in finished.output
     assert "Traceback" not in finished.output
+
+
+def test_a_plan_goes_from_here_to_qgroundcontrol_and_onto_a_map(tmp_path: Path):
+    planned = programs.run("gcs", "plan", "field", "--output", str(tmp_path / "x.plan"))
+    assert planned.code == 0, planned.output
+    mapped = programs.run("gcs", "convert", str(tmp_path / "x-alpha.plan"), str(tmp_path / "x.kml"))
+    refused = programs.run("gcs", "convert", str(tmp_path / "x-alpha.plan"), str(tmp_path / "x.waypoints"))
+    assert (mapped.code, refused.code) == (0, 2)
+    assert "a mission alone, and there is more: 1 fence polygon" in refused.output
+    assert "<LineString>" in (tmp_path / "x.kml").read_text()

@@ -206,6 +206,21 @@ def test_return_flies_to_the_nearest_of_home_and_rally_points(kind, there):
     assert np.allclose(flown.position[:2], there, atol=0.4)
 
 
+@pytest.mark.parametrize(("kind", "there"), [(0, (0.0, 0.0)), (1, (0.0, 25.0)), (2, (0.0, 25.0)), (3, (0.0, 25.0))])
+def test_return_may_go_to_the_missions_own_landing(kind, there):
+    flown = Flown().take_off(5.0)
+    landing = (6, 21, 0, 0, 0, NAN, *place(25.0, 0.0), 0.0)
+    flown.upload([waypoint(5.0, 5.0, 5.0), (2, 189, 0, 0, 0, 0, 0, 0, 0.0), landing])
+    flown.set_parameter("RTL_TYPE", kind)
+    flown.set_parameter("RTL_RETURN_ALT", 8.0)
+    x, y = place(20.0, 0.0)
+    flown.command(192, -1, 1, 0, NAN, x * 1e-7, y * 1e-7, 494.4)
+    flown.run(10.0)
+    flown.command(20)
+    flown.until(lambda: not flown.armed, 60.0)
+    assert np.allclose(flown.position[:2], there, atol=0.4)
+
+
 def test_return_goes_home_when_that_is_nearest():
     flown = Flown().take_off(5.0)
     flown.upload(RALLY, kind=2)

@@ -1,0 +1,78 @@
+"""Finding back into a flight that a crashed ground station has left alone: hear, download, compare; command nothing."""
+
+import asyncio
+from pathlib import Path
+
+import msgspec
+
+from gcs.dialect import AUTOPILOT
+from gcs.errors import GcsError
+from gcs.fleet.vehicle_state import LandedState, VehicleState
+from gcs.flight.events import EventLog, Severity
+from gcs.flight.journal import JOURNAL_FILE, Story, is_written, read_story
+from gcs.flight.sequence import FleetFlight
+from gcs.flight.upload import first_difference
+from gcs.flight.vehicle_flight import VehicleFlight
+from gcs.microservices.mission_transfer_client import MissionDownload
+from gcs.station import Station
+from missions.mission import Mission
+
+HEARD_TIMEOUT_S = 20.0
+LOOKED_AT = 20
+"""How many of the newest flights are looked at for one that was left in the air."""
+
+
+def unfinished(folder: Path, mission: Mission) -> Story | None:
+    """The flight of this mission that was left in the air by whoever wrote into a folder; None if there is none."""
+    story = read_story(folder / JOURNAL_FILE)
+    if story is None or story.ended or not story.aloft:
+        return None
+    same = msgspec.structs.replace(story.began.mission, origin=mission.origin)
+    return story if same.digest == mission.digest else None
+
+
+def left_in_flight(folders: Path, mission: Mission) -> Path | None:
+    """The newest of many flights' folders that holds an unfinished flight of a mission, its ground station gone."""
+    if not folders.is_dir():
+        return None
+    for folder in sorted(folders.iterdir(), reverse=True)[:LOOKED_AT]:
+        if unfinished(folder, mission) is not None and not is_written(folder / JOURNAL_FILE):
+            return folder
+    return None
+
+
+async def rejoin(flight: FleetFlight, events: EventLog) -> None:
+    """Look for the vehicles of a restored flight, whether they still fly or have come down meanwhile.
+
+    What is stored on them is downloaded and compared with what was uploaded. Nothing is commanded, and nothing will be
+    without an operator's order.
+    """
+    flight.passive = True
+    aloft = list(flight.in_flight)
+    names = ", ".join(part.name for part in aloft)
+    events.add("rejoin", f"the last ground station left {names} in flight; looking for them, commanding nothing")
+    await asyncio.gather(*(_look(flight.station, part, events) for part in aloft))
+
+
+async def _look(station: Station, part: VehicleFlight, events: EventLog) -> None:
+    fleet = station.fleet.vehicles
+    if not await station.holds_within(lambda: _is_known(fleet.get(part.sysid)), HEARD_TIMEOUT_S):
+        events.add("rejoin", f"not heard within {HEARD_TIMEOUT_S:g} s", part.name, Severity.ERROR)
+        part.monitor.give_up("not heard after the restart of the ground station")
+        return
+    try:
+        found = (await station.run(MissionDownload((part.sysid, AUTOPILOT)))).items
+    except GcsError as problem:
+        events.add("rejoin", f"its mission could not be compared: {problem}", part.name, Severity.ERROR)
+        return
+    difference = first_difference(part.items, found)
+    if difference:
+        events.add("rejoin", f"another mission is stored than was uploaded: {difference}", part.name, Severity.ERROR)
+    else:
+        text = f"{fleet[part.sysid].mode.name.lower()}, item {fleet[part.sysid].mission_seq} of the uploaded mission"
+        events.add("rejoin", text, part.name)
+
+
+def _is_known(state: VehicleState | None) -> bool:
+    """It has said whether it is in the air, and where."""
+    return state is not None and state.landed is not LandedState.UNDEFINED and state.place is not None
