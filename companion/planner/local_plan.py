@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 LADDER = (1.0, 0.6, 1.0 / 3.0)
 """Shares of the horizon that are tried one after the other."""
-TIME_SCALES = (0.0, np.log(1.06), np.log(1.15), np.log(1.35), np.log(1.8), np.log(2.4))
+TIME_SCALES = (0.0, np.log(1.06), np.log(1.15), np.log(1.35))
 """Logarithms of the time scales of the first particles."""
 TIME_SPREAD = 0.05
 """Of the other particles' time scales."""
