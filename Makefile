@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes fuzz check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -55,9 +55,19 @@ check-px4: install  ## fly the whole sequence on an autopilot that is there: mak
 bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)
 
-bench-onboard: SEEDS = 0:50
-bench-onboard: $(VENV)/.installed-bench  ## the onboard planner beside its requirements: make bench-onboard SEEDS=0:50 [BENCH=--quick]
-	$(BIN)/python -m tests.benchmarks.onboard --seeds $(SEEDS) $(BENCH)
+experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10
+	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS)
+
+bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, alone (50 seeds are asked for) and in fleets: make bench-onboard SEEDS=0:10 [BENCH=--quick]
+	@alone=0; $(BIN)/python -m tests.benchmarks.onboard --seeds $(SEEDS) $(BENCH) || alone=1; \
+	$(BIN)/python -m tests.benchmarks.onboard.fleet_rows --seeds $(SEEDS) && exit $$alone
+
+bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK and MAVProxy, and a fleet of a hundred: make bench-link SEEDS=0:30 [BENCH=--quick]
+	$(BIN)/python -m tests.benchmarks.link --seeds $(SEEDS) $(BENCH)
+
+SECONDS ?= 60
+fuzz: $(VENV)/.installed-dev  ## hostile traffic on all receive paths: make fuzz SECONDS=60
+	$(BIN)/python -m tests.fuzz --seconds $(SECONDS)
 
 check: $(VENV)/.installed-dev  ## the fast checks: format, lint, types, import contracts
 	$(BIN)/ruff format --check .

@@ -1,10 +1,12 @@
 """The supervisor: feeds the pilot with what happens, carries out what it wants, and has one way out."""
 
 import asyncio
+import math
 import time
 import traceback
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, TypeVar
 
 from companion import events, instructions
@@ -13,11 +15,14 @@ from companion.errors import CommandRefused, CompanionError
 from companion.events import Event, FlightMode
 from companion.fault_injection import FaultInjection
 from companion.fleet.desk import FleetDesk
+from companion.fleet.neighbour import Neighbour
 from companion.instructions import Instruction
 from companion.journal import Journal
 from companion.link.autopilot import Autopilot
+from companion.observations import Observations
 from companion.pilot import Pilot
 from companion.planner.planner import Plan, Planner, PlanRequest
+from companion.sensing.scan import Scan
 from companion.sensing.sensing import Sensing
 from companion.settings import CompanionSettings
 from companion.vehicle_clock import VehicleClock
@@ -76,6 +81,10 @@ class App:
         self._ended = asyncio.Event()
         self._state = self.pilot.state
         self._actions: set[asyncio.Task[None]] = set()
+        self._observations = Observations(self.planner.voxel_m, self.settings.report_bytes_s)
+        self._noted_s = -math.inf
+        self._unseen: Scan | None = None
+        self._observing = False
 
     def request_stop(self) -> None:
         """Leave the vehicle in a chosen state and end; may be called again."""
@@ -141,11 +150,33 @@ class App:
             self.faults.tick(in_control=self.pilot.in_control, now_s=self._now_s)
 
     def _look(self) -> bool:
-        """Take in what the sensor has to say; whether it is silent."""
+        """Let the planner see what the sensor has seen; whether the sensor is silent."""
         if self.sensing is None:
             return False
-        self.sensing.look(self.pilot.briefing.frame, self._now_s)
+        scan = self.sensing.look(self.pilot.briefing.frame, self._now_s)
+        if scan is not None:
+            self._unseen = scan  # one that the planner had no time for is overtaken
+            if not self._observing:
+                self._observing = True
+                self._later(self._observe())
         return self.sensing.is_silent(self._now_s)
+
+    async def _observe(self) -> None:
+        """Show scans to the planner until there is none."""
+        while (scan := self._unseen) is not None:
+            self._unseen = None
+            others = self.fleet.exchange.neighbours(self._now_s) if self.fleet is not None else ()
+            await self.work(partial(self._take_in, scan, others))
+            for block in self._observations.due(scan.sensor_enu_m, scan.time_s):
+                self.autopilot.send_tunnel(PayloadType.OCCUPANCY, block)
+        self._observing = False
+
+    def _take_in(self, scan: Scan, others: tuple[Neighbour, ...]) -> None:
+        """Show a scan to the planner; now and then, note what the ground does not know of yet."""
+        self.planner.observe(scan, others)
+        if scan.time_s - self._noted_s >= self.settings.pilot.report_interval_s:
+            self._noted_s = scan.time_s
+            self._observations.update(*self.planner.certain(), scan.time_s)
 
     async def _wait_for_stop(self) -> None:
         await self._stop.wait()

@@ -26,13 +26,14 @@ from companion.link.px4 import Px4
 from companion.link.sensor_port import SensorPort, parse_address
 from companion.pilot import Pilot
 from companion.planner.planner import Planner
-from companion.sensing.sensing import Driver, Sensing, driver_of
+from companion.sensing.sensing import Driver, Sensing, driver_of, ring_hz_of
 from companion.settings import CompanionSettings, PlanningMode
 from companion.warm_up import warm_up
 from missions.errors import MissionError
 from missions.faults import EXAMPLES, Fault, parse_fault
 from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
+from missions.lean_numba import give_back_the_compiler, leave_out_what_no_kernel_needs
 from missions.lidar_packets import FIRST_PORT
 from missions.mission import Mission, SensorKind, load_mission
 from missions.ports import RADIO_PORT, companion_port, fleet_port
@@ -107,6 +108,7 @@ def companion(
 
 def main() -> None:
     """Entry point of the console script."""
+    leave_out_what_no_kernel_needs()
     app()
 
 
@@ -127,6 +129,7 @@ async def _fly(
     journal.tell("preparing the planner (a fresh machine compiles it once, which takes half a minute)")
     with one_at_a_time("companion"):
         warm_up(planner, mission, vehicle)
+    give_back_the_compiler()
     with ExitStack() as open_ports, ThreadPoolExecutor(1, thread_name_prefix="planner") as threads:
         sensing = None if driver is None else _sensing(driver, settings, mission, open_ports)
         fleet = _fleet(settings, mission, open_ports)
@@ -139,7 +142,7 @@ async def _fly(
             settings,
             Pilot(mission, settings, planner, fleet.exchange),
             planner,
-            Px4(settings.vehicle, settings.system_url, journal.tell, ring_hz=_ring_hz(settings, mission)),
+            Px4(settings.vehicle, settings.system_url, journal.tell, ring_hz=ring_hz_of(settings.sensor, mission)),
             work,
             KernelTimer(settings.deadman_s),
             FaultInjection(faults, settings.vehicle),
@@ -177,10 +180,6 @@ def _fleet(settings: CompanionSettings, mission: Mission, open_ports: ExitStack)
     port = open_ports.enter_context(FleetPort(parse_fleet_link(settings.fleet_link), settings.fleet_port))
     frames = FleetFrames(settings.vehicle, mission.frame)
     return FleetDesk(Exchange(settings.vehicle, mission), mission, frames, port.poll, port.send)
-
-
-def _ring_hz(settings: CompanionSettings, mission: Mission) -> float:
-    return mission.sensor.rate_hz if settings.sensor is SensorKind.OBSTACLE_DISTANCE else 0.0
 
 
 def _end_with_parent(request_stop: Callable[[], None]) -> None:

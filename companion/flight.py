@@ -281,8 +281,9 @@ class Flight:
             return Reason.NO_SENSOR
         if self._conflict_s - now_s < self._brakes_s(now_s):
             return Reason.NO_PATH
-        ended = self.is_at_rest(now_s) and not self.course.reaches_end and not self._traffic.makes_way
-        return Reason.NO_PATH if ended else Reason.NONE
+        ended = self.is_at_rest(now_s) and not self.course.reaches_end
+        waits = self._left_track_at is not None and not self._traffic.is_stuck(now_s)
+        return Reason.NO_PATH if ended and not waits and not self._traffic.makes_way else Reason.NONE
 
     def _brakes_s(self, now_s: float) -> float:
         """Whoever meets something within this time brakes instead of waiting for a plan [s]."""

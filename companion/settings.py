@@ -63,6 +63,8 @@ class PilotSettings:
 
     tick_s: float = 0.02
     status_interval_s: float = 0.2
+    report_interval_s: float = 0.2
+    """Between two looks at the map for what the ground does not know of yet."""
     replan_age_s: float = 1.0
     """A committed trajectory is replaced when it is this old."""
     retry_s: float = 0.3
@@ -112,6 +114,8 @@ class CompanionSettings:
     fleet_port: int = 14700
     """Bound for a relay."""
     deadman_s: float = 0.5
+    report_bytes_s: float = 3300.0
+    """Of the link, for what was seen [bytes/s of vehicle time]; with status and trajectories it makes 4 kB/s."""
     reserve: Reserve = field(default_factory=Reserve)
     search: SearchSettings = field(default_factory=SearchSettings)
     pilot: PilotSettings = field(default_factory=PilotSettings)

@@ -159,6 +159,10 @@ class Traffic:
         if self.makes_way and len(self._places_m) > 1:
             self._places_m = self._places_m[1:]
 
+    def is_stuck(self, now_s: float) -> bool:
+        """There has been no path for a while."""
+        return self.right.is_stuck(now_s)
+
     def shall_want(self, now_s: float) -> bool:
         """It is time to tell which path is wanted."""
         return self.right.is_stuck(now_s) and now_s - self._wanted_s > WANT_INTERVAL_S

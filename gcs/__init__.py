@@ -8,6 +8,7 @@ Layers, each importing only what stands below it:
     desk            what can be seen and done in a session
     flight          the flight sequence, its checks, monitor and reports
     station         all vehicles on all links: routes messages to services and state
+    exchange        one microservice at work
     microservices   sans-IO MAVLink services (commands, missions, parameters)
     link, fleet     datagrams and recordings; telemetry folded into state
     replanning      when the cloud plans anew in flight, what for, and whether the answer is flown

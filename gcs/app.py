@@ -21,8 +21,8 @@ from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
+from gcs.link.opening import open_link
 from gcs.link.tlog import TlogWriter
-from gcs.link.udp import open_udp
 from gcs.processes import Child, Processes
 from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
@@ -73,7 +73,10 @@ class FlightApp:
         self.settings, self.work_dir, self._page = settings, work_dir, page
         self._keys = key_ring(settings, mission, work_dir, events)
         self._journal = _journal(work_dir)
-        station = Station(recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None))
+        station = Station(
+            recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None),
+            say=lambda text: events.add("link", text, severity=Severity.WARNING),
+        )
         self._audit = AuditFile(work_dir / AUDIT_FILE)
         station.audit = Audit(self._audit.write, station.unix_us)
         station.codec.signing = self._keys.signing(station.unix_us)
@@ -123,7 +126,7 @@ class FlightApp:
             stack.callback(self.station.recording.close)
             stack.callback(self._audit.close)
             for url in self.settings.ground_links():
-                connection = await open_udp(url, self.station.receive)
+                connection = await open_link(url, self.station.receive, self.station.say)
                 stack.callback(connection.close)
                 self.station.connections.append(connection)
             simulator = await stack.enter_async_context(Processes(self.work_dir))

@@ -46,7 +46,10 @@ app = typer.Typer(
 
 MissionArgument = Annotated[str, typer.Argument(metavar="MISSION", help="a mission file, or a shipped mission's name")]
 LinkOption = Annotated[
-    list[str] | None, typer.Option("--link", metavar="URL", help="udpin://HOST:PORT or udpout://HOST:PORT; repeatable")
+    list[str] | None,
+    typer.Option(
+        "--link", metavar="URL", help="udpin, udpout, tcp, tcpin://HOST:PORT, serial://DEVICE:BAUD; repeatable"
+    ),
 ]
 SeedOption = Annotated[int, typer.Option(min=0, help="of planner and simulator: one seed, one plan")]
 InstanceOption = Annotated[int, typer.Option("--instance-base", min=0, max=10_000, help="shifts all ports")]

@@ -38,6 +38,10 @@ class CommandRefused(GcsError):
     """An autopilot or companion refused a command."""
 
 
+class AmbiguousVehicle(GcsError):
+    """More than one vehicle answers to a system id; nothing was sent."""
+
+
 class MissionTransferError(GcsError):
     """A mission or fence could not be stored, or what is stored is not what was sent."""
 

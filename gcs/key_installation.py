@@ -9,7 +9,7 @@ import contextlib
 
 from gcs.dialect import AUTOPILOT, mavlink
 from gcs.errors import LinkLost, UsageError
-from gcs.link.udp import open_udp
+from gcs.link.opening import open_link
 from gcs.link.url import LinkUrl
 from gcs.security.key_ring import KeyRing, new_key
 from gcs.security.signing import Signing, Trust, VehicleKey
@@ -46,7 +46,7 @@ async def install_key(ring: KeyRing, sysid: int, link: LinkUrl) -> None:
     """
     station = Station()
     station.codec.signing = signing = ring.signing(station.unix_us)
-    connection = await open_udp(link, station.receive)
+    connection = await open_link(link, station.receive, station.say)
     station.connections.append(connection)
     heartbeats = asyncio.create_task(station.send_heartbeats())
     try:

@@ -3,40 +3,39 @@ microservices that run, and sends for them.
 """
 
 import asyncio
-import math
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-from gcs.dialect import Message, mavlink
-from gcs.errors import LinkLost
+from gcs.dialect import AUTOPILOT, Message, mavlink
+from gcs.errors import AmbiguousVehicle, LinkLost
+from gcs.exchange import Exchange
 from gcs.fleet.fleet import Fleet
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.link.codec import Codec
+from gcs.link.connection import Address, Connection
+from gcs.link.paths import LinkQuality
+from gcs.link.routes import Routes
+from gcs.link.shaper import Shaper, Urgency
 from gcs.link.tlog import TlogWriter
 from gcs.microservices import Microservice
+from gcs.microservices.mission_messages import LinkEstimate
 from gcs.security.audit import Audit
 
 HEARTBEAT_INTERVAL_S = 1.0
+BULK = frozenset({"MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_SET", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST"})
+"""What gives way to everything else where a link's budget is short."""
 
-Address = tuple[str, int]
 S = TypeVar("S", bound=Microservice)
 
 
-class Connection(Protocol):
-    """What a datagram socket, or its stand-in in memory, does for the station."""
-
-    peer: Address | None
-
-    def send(self, datagram: bytes, address: Address) -> None: ...
-
-
-@dataclass
-class _Inbox:
-    wants: frozenset[str]
-    queue: asyncio.Queue[Message]
+def _who_are_you(sysid: int) -> Message:
+    """A request for AUTOPILOT_VERSION, which has the hardware's id."""
+    params = (float(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION), *(0.0,) * 6)
+    request = mavlink.MAV_CMD_REQUEST_MESSAGE
+    return mavlink.MAVLink_command_long_message(sysid, AUTOPILOT, request, 0, *params)
 
 
 @dataclass
@@ -47,6 +46,7 @@ class Station:
         recording: where all frames, received and sent, are written.
         audit: where all orders and their results are written.
         unix_us: the wall clock for the recording's stamps.
+        say: takes a sentence for the operator about links and who is on them.
     """
 
     recording: TlogWriter | None = None
@@ -57,64 +57,80 @@ class Station:
     connections: list[Connection] = field(default_factory=list)
     sent: dict[int, int] = field(default_factory=lambda: defaultdict(int))
     """Messages sent to each system."""
+    say: Callable[[str], None] = lambda text: None
 
     def __post_init__(self) -> None:
-        self._routes: dict[int, tuple[Connection, Address]] = {}
-        self._inboxes: dict[tuple[int, int], list[_Inbox]] = defaultdict(list)
+        self.routes = Routes((self.codec.system, self.codec.component), lambda text: self.say(text))
+        self._exchanges: dict[tuple[int, int], list[Exchange]] = defaultdict(list)
+        self._turns: dict[tuple[tuple[int, int], str], asyncio.Lock] = {}
+        self._shapers: dict[Connection, Shaper] = {}
+        self._pumping: set[Connection] = set()
 
     def receive(self, connection: Connection, datagram: bytes, address: Address) -> None:
         """Take in one datagram."""
         now_s = self.now_s
+        way = (connection, address)
         for message in self.codec.parse(datagram):
-            source = (message.get_srcSystem(), message.get_srcComponent())
-            if source == (self.codec.system, self.codec.component) or source[0] == 0:
-                continue  # our own frame, forwarded back to us, or nobody's
+            if not self.routes.heard(message, way, now_s):
+                continue  # our own frame, nobody's, or a second vehicle with the same system id
             if self.recording is not None:
                 self.recording.write(message.get_msgbuf(), self.unix_us())
-            self._routes[source[0]] = (connection, address)
             self.fleet.fold(message, now_s)
             if not self._is_for_us(message):
                 continue
             if self.audit is not None:
                 self.audit.received(message)
-            for inbox in self._inboxes.get(source, ()):
-                if message.get_type() in inbox.wants:
-                    inbox.queue.put_nowait(message)
+            for exchange in tuple(self._exchanges.get((message.get_srcSystem(), message.get_srcComponent()), ())):
+                exchange.deliver(message)
 
     def send(self, message: Message, sysid: int) -> None:
-        """Send to where `sysid` was last heard; a system that was never heard gets nothing."""
-        route = self._routes.get(sysid)
-        if route is not None:
-            connection, address = route
-            self._transmit(message, connection, address, sysid)
+        """Send to where `sysid` is heard best; a system that was never heard gets nothing."""
+        way = self.routes.best(sysid, self.now_s)
+        if way is not None:
+            self._transmit(message, way, sysid)
             self.sent[sysid] += 1
 
     async def run(self, service: S) -> S:
-        """Drive one microservice to its end; its own errors pass through."""
-        inbox = _Inbox(service.wants, asyncio.Queue())
-        self._inboxes[service.peer].append(inbox)
+        """Drive one microservice to its end; its own errors pass through.
+
+        Exchanges of one kind with one component wait for each other's end. One that is cancelled says so to its peer.
+
+        Raises:
+            AmbiguousVehicle: two vehicles use this system id, and what is asked would not make the flight safer.
+        """
+        sysid = service.peer[0]
+        rivals = self.routes.rivals(sysid, self.now_s)
+        if rivals and not service.makes_safe:
+            raise AmbiguousVehicle(f"vehicle {sysid}: more than one vehicle uses this system id; nothing was sent")
+        turn = service.turn
+        if turn is None:
+            return await self._run(service)
+        async with self._turns.setdefault((service.peer, turn), asyncio.Lock()):
+            return await self._run(service)
+
+    async def _run(self, service: S) -> S:
+        sysid = service.peer[0]
+        exchange = Exchange(service, lambda messages: self._send_all(messages, sysid))
+        exchanges = self._exchanges[service.peer]
+        for other in tuple(exchanges):
+            other.give_way_to(service)
+        exchanges.append(exchange)
         try:
-            self._send_all(service.start(self.now_s), service.peer[0])
-            while not service.done:
-                try:
-                    async with asyncio.timeout_at(service.deadline_s if math.isfinite(service.deadline_s) else None):
-                        message = await inbox.queue.get()
-                except TimeoutError:
-                    self._send_all(service.handle_timeout(self.now_s), service.peer[0])
-                else:
-                    self._send_all(service.receive(message, self.now_s), service.peer[0])
-            return service
+            await exchange.run()
         finally:
-            self._inboxes[service.peer].remove(inbox)
+            exchanges.remove(exchange)
+        return service
 
     async def send_heartbeats(self) -> None:
-        """Say every second that this ground station is here; runs until it is cancelled."""
+        """Say every second that this ground station is here, and measure round trips; runs until it is cancelled."""
         heartbeat = mavlink.MAVLink_heartbeat_message(
             mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
         )
         while True:
             for (connection, address, _), sysid in self._destinations().items():
-                self._transmit(heartbeat, connection, address, sysid)
+                self._transmit(heartbeat, (connection, address), sysid)
+            for sysid in self.fleet.vehicles:
+                self._measure_round_trips(sysid)
             await asyncio.sleep(HEARTBEAT_INTERVAL_S)
 
     async def holds_within(self, condition: Callable[[], bool], timeout_s: float, poll_s: float = 0.02) -> bool:
@@ -146,10 +162,31 @@ class Station:
         except KeyError:
             raise LinkLost(f"vehicle {sysid} has not been heard") from None
 
+    def quality(self, sysid: int) -> LinkQuality | None:
+        """How well a system is heard over its best path; None if it never was."""
+        return self.routes.quality(sysid, self.now_s)
+
+    def link_estimate(self, sysid: int) -> LinkEstimate:
+        """What is known of the way to a vehicle, for a transfer that begins."""
+        quality = self.quality(sysid)
+        return LinkEstimate(quality.round_trip_s, quality.loss) if quality is not None else LinkEstimate()
+
+    def vehicles_on_link_of(self, sysid: int) -> tuple[int, float | None]:
+        """How many systems share the connection over which `sysid` is reached, and its budget [bytes/s]."""
+        way = self.routes.best(sysid, self.now_s)
+        if way is None:
+            return 1, None
+        sharing = sum(1 for other in self.fleet.vehicles if self._connection(other) is way[0])
+        return max(sharing, 1), way[0].budget_bytes_s
+
     @property
     def now_s(self) -> float:
         """The running event loop's monotonic clock [s]."""
         return asyncio.get_running_loop().time()
+
+    def _connection(self, sysid: int) -> Connection | None:
+        way = self.routes.best(sysid, self.now_s)
+        return way[0] if way is not None else None
 
     def _is_for_us(self, message: Message) -> bool:
         """Routers carry also what is meant for companions and other ground stations: it answers nothing of ours."""
@@ -157,24 +194,53 @@ class Station:
         targets = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
         return all(target in {0, our} for target, our in zip(targets, ours, strict=True))
 
+    def _measure_round_trips(self, sysid: int) -> None:
+        """On every path; where there are several, it is also asked whose they are."""
+        live = self.routes.live_paths(sysid, self.now_s)
+        for way, path in live:
+            self._transmit(mavlink.MAVLink_timesync_message(0, path.ping(self.now_s)), way, sysid)
+            if len(live) > 1 and path.hardware_id is None:
+                self._transmit(_who_are_you(sysid), way, sysid)
+
     def _send_all(self, messages: Iterable[Message], sysid: int) -> None:
         for message in messages:
             self.send(message, sysid)
 
-    def _transmit(self, message: Message, connection: Connection, address: Address, sysid: int) -> None:
+    def _transmit(self, message: Message, way: tuple[Connection, Address], sysid: int) -> None:
+        connection, address = way
         if self.audit is not None:
             self.audit.sent(message, sysid)
-        frame = self.codec.pack(message, sysid)
+        frame = self.codec.pack(message, sysid, lane=way)
         if self.recording is not None:
             self.recording.write(frame, self.unix_us())
-        connection.send(frame, address)
+        if connection.budget_bytes_s is None:
+            connection.send(frame, address)
+            return
+        shaper = self._shapers.setdefault(connection, Shaper(connection.budget_bytes_s))
+        urgency = Urgency.BULK if message.get_type() in BULK else Urgency.CONTROL
+        for due, where in shaper.offer(frame, address, urgency, self.now_s):
+            connection.send(due, where)
+        self._pump_later(connection, shaper)
+
+    def _pump_later(self, connection: Connection, shaper: Shaper) -> None:
+        wait_s = shaper.wait_s
+        if wait_s is not None and connection not in self._pumping:
+            self._pumping.add(connection)
+            asyncio.get_running_loop().call_later(wait_s, self._pump, connection, shaper)
+
+    def _pump(self, connection: Connection, shaper: Shaper) -> None:
+        self._pumping.discard(connection)
+        for due, where in shaper.due(self.now_s):
+            connection.send(due, where)
+        self._pump_later(connection, shaper)
 
     def _destinations(self) -> dict[tuple[Connection, Address, bytes | None], int]:
         """Everybody who was heard, and the peers of connections on which nobody was heard yet.
 
         Where several vehicles are behind one address, one of them stands for all that have its key.
         """
-        routes = set(self._routes.values())
+        ways = self.routes.live_ways(self.now_s)
+        routes = {way for _, way in ways}
         silent = {(c, c.peer, None): 0 for c in self.connections if c.peer is not None and (c, c.peer) not in routes}
-        heard = {(*route, self.codec.signing.key(sysid)): sysid for sysid, route in self._routes.items()}
+        heard = {(*way, self.codec.signing.key(sysid)): sysid for sysid, way in ways}
         return silent | heard

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from gcs.app import TRAIL_INTERVAL_S, Page
 from gcs.desk import Desk
-from gcs.flight.events import EventLog
+from gcs.flight.events import EventLog, Severity
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.trails import Trails
+from gcs.link.opening import open_link
 from gcs.link.tlog import TlogWriter
-from gcs.link.udp import open_udp
 from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.security.key_ring import KeyRing
 from gcs.settings import FlightSettings
@@ -25,7 +25,10 @@ async def watch(settings: FlightSettings, events: EventLog, work_dir: Path, page
         UsageError: a port in use, or a key ring that cannot be used.
     """
     audit = AuditFile(work_dir / AUDIT_FILE)
-    station = Station(recording=TlogWriter(work_dir / "flight.tlog"))
+    station = Station(
+        recording=TlogWriter(work_dir / "flight.tlog"),
+        say=lambda text: events.add("link", text, severity=Severity.WARNING),
+    )
     station.audit = Audit(audit.write, station.unix_us)
     station.codec.signing = KeyRing(settings.key_folder()).signing(station.unix_us)
     desk = Desk(station, events)
@@ -34,7 +37,7 @@ async def watch(settings: FlightSettings, events: EventLog, work_dir: Path, page
         stack.callback(station.recording.close)
         stack.callback(audit.close)
         for url in settings.ground_links():
-            connection = await open_udp(url, station.receive)
+            connection = await open_link(url, station.receive, station.say)
             stack.callback(connection.close)
             station.connections.append(connection)
             events.add("link", f"listening on {url}")

@@ -13,6 +13,7 @@ from missions.errors import MissionError
 from missions.faults import SIMULATOR_EXAMPLES, parse_simulator_fault
 from missions.frames import parse_origin
 from missions.kernels import one_at_a_time
+from missions.lean_numba import leave_out_what_no_kernel_needs
 from missions.mission import Mission, load_mission
 from missions.ports import FIRST_COMPANION_PORT
 from sitl.announcement import announced_compilation
@@ -20,7 +21,6 @@ from sitl.autopilot.memory import Memory, SigningMemory
 from sitl.autopilot.parameter_table import parameter_table
 from sitl.dynamics.airframe import AirframeName
 from sitl.errors import SitlError
-from sitl.lean_numba import leave_out_what_no_kernel_needs
 from sitl.link.memory_files import MemoryFiles
 from sitl.open_field import open_field
 from sitl.service import serve

@@ -30,7 +30,7 @@ class FleetSettings:
     """A plan that was not repeated for so long counts less than a fresh position; and its radius begins to grow."""
     growth_m_s: float = 0.25
     """The radius of who is silent grows so fast ..."""
-    most_growth_m: float = 1.5
+    most_growth_m: float = 0.75
     """... up to this: a room must not be closed by one dead radio."""
     off_plan_m: float = 0.75
     """A vehicle farther from its plan than this, and than its position may be wrong, does not fly that plan."""

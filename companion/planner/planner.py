@@ -117,7 +117,8 @@ class Planner:
             REACH_FARTHER * max(self.limits.avoidance_distance_m, self.limits.clearance_m),
             mission.limits.body_radius_m,
         )
-        self.cell_m = CELLS_PER_VOXEL * mission.onboard.voxel_m
+        self.voxel_m = mission.onboard.voxel_m
+        self.cell_m = CELLS_PER_VOXEL * self.voxel_m
 
     @property
     def horizon_m(self) -> float:

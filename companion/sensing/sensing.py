@@ -104,3 +104,8 @@ def driver_of(kind: SensorKind, mission: Mission) -> LidarDriver | ObstacleDista
             )
         case SensorKind.NONE:
             return None
+
+
+def ring_hz_of(kind: SensorKind, mission: Mission) -> float:
+    """How often OBSTACLE_DISTANCE is wanted [Hz]; 0 for not at all."""
+    return mission.sensor.rate_hz if kind is SensorKind.OBSTACLE_DISTANCE else 0.0

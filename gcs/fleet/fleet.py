@@ -9,7 +9,8 @@ from missions.errors import WireFormatError
 from missions.occupancy import decode_block
 from missions.tunnel import PayloadType
 
-MAX_VEHICLES = 250
+MAX_VEHICLES = 254
+"""As many as there are system ids besides ours."""
 
 
 @dataclass

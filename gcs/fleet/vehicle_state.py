@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.dialect import AUTOPILOT, COMPANION, Message, Mode, mavlink
+from gcs.fleet.status_texts import StatusText, StatusTexts
 from missions import tunnel
 from missions.errors import WireFormatError
 from missions.frames import GeodeticPoint, LocalFrame
@@ -41,15 +42,6 @@ class LandedState(IntEnum):
     @classmethod
     def _missing_(cls, value: object) -> "LandedState":
         return cls.UNDEFINED
-
-
-@dataclass(frozen=True)
-class StatusText:
-    """A line that the autopilot said."""
-
-    time_s: float
-    severity: int
-    text: str
 
 
 @dataclass
@@ -92,6 +84,7 @@ class VehicleState:
     boot_heard_s: float = -math.inf
     mission_seq: int = 0
     mission_id: int = 0
+    speech: StatusTexts = field(default_factory=StatusTexts)
     texts: deque[StatusText] = field(default_factory=lambda: deque(maxlen=TEXTS_KEPT))
     companion: CompanionView = field(default_factory=CompanionView)
     undecodable: int = 0
@@ -155,6 +148,7 @@ class VehicleState:
 
     def _heartbeat(self, message: Message, now_s: float) -> None:
         self.heard_s = now_s
+        self.texts.extend(self.speech.overdue(now_s))
         self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = Mode(message.custom_mode)
         self.failsafe = message.system_status == mavlink.MAV_STATE_CRITICAL
@@ -192,7 +186,7 @@ class VehicleState:
         self.mission_seq, self.mission_id = message.seq, message.mission_id
 
     def _status_text(self, message: Message, now_s: float) -> None:
-        self.texts.append(StatusText(now_s, message.severity, message.text.rstrip("\t\x00 ")))
+        self.texts.extend(self.speech.receive(message, now_s))
 
     def _clock(self, message: Message, now_s: float) -> None:
         self.boot_time_s, self.boot_heard_s = message.time_boot_ms / 1000.0, now_s

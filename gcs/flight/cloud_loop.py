@@ -124,7 +124,7 @@ class CloudLoop:
         flight, vehicle = self.flight, self.flight.vehicles[part.sysid]
         items = mission_items(part, flight.mission, flight.mode, vehicle.monitor.ground_offset_m)
         try:
-            await upload.store(flight.station, part.sysid, items)
+            await upload.swap(flight.station, part.sysid, items)
             await self._confirmed(vehicle, plan_id(items))
         except GcsError as problem:
             flight.events.add("swap failed", str(problem), vehicle.name, Severity.WARNING)

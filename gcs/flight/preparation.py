@@ -14,8 +14,9 @@ from gcs.flight.events import EventLog
 from gcs.flight.fence import fence_items
 from gcs.flight.monitor import Phase, describe
 from gcs.flight.vehicle_flight import VehicleFlight
+from gcs.link.shaper import fitting_rates
 from gcs.microservices.command_client import CommandClient
-from gcs.microservices.mission_transfer_client import FENCE
+from gcs.microservices.mission_messages import FENCE
 from gcs.planner.plan import VehiclePlan
 from gcs.settings import PlanningMode
 from gcs.station import Station
@@ -32,6 +33,8 @@ CONNECT_TIMEOUT_S = 240.0
 READY_TIMEOUT_S = 60.0
 COMPANION_READY_TIMEOUT_S = 30.0
 
+FRAME_BYTES = 12
+"""Of a MAVLink 2 frame besides its payload."""
 STREAM_RATES_HZ = {
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 10.0,
@@ -120,7 +123,9 @@ class Preparation:
         return self.station.vehicle(flight.sysid)
 
     async def _request_streams(self, vehicle: Vehicle) -> None:
-        for message_id, rate_hz in STREAM_RATES_HZ.items():
+        n_vehicles, budget_bytes_s = self.station.vehicles_on_link_of(vehicle.sysid)
+        sizes = {number: mavlink.mavlink_map[number].unpacker.size + FRAME_BYTES for number in STREAM_RATES_HZ}
+        for message_id, rate_hz in fitting_rates(STREAM_RATES_HZ, sizes, n_vehicles, budget_bytes_s).items():
             command = actions.set_message_interval(message_id, rate_hz)
             try:
                 await self.station.run(CommandClient(command, (vehicle.sysid, AUTOPILOT)))

@@ -11,9 +11,9 @@ from gcs.fleet.vehicle_state import LandedState, VehicleState
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.journal import JOURNAL_FILE, Story, is_written, read_story
 from gcs.flight.sequence import FleetFlight
-from gcs.flight.upload import first_difference
 from gcs.flight.vehicle_flight import VehicleFlight
-from gcs.microservices.mission_transfer_client import MissionDownload
+from gcs.microservices.mission_comparison import first_difference
+from gcs.microservices.mission_download import MissionDownload
 from gcs.station import Station
 from missions.mission import Mission
 

@@ -9,11 +9,9 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from gcs.dialect import AUTOPILOT
 from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trail
 from gcs.flight.vehicle_flight import VehicleFlight
-from gcs.link.codec import SourceCount
 from missions import obstacles
 from missions.mission import Mission
 from missions.time_law import arc_length
@@ -158,7 +156,8 @@ def min_separation_m(flown: Sequence[Flown]) -> float | None:
 def _vehicle_report(flight: FleetFlight, part: VehicleFlight, flown: Flown | None) -> VehicleReport:
     state = flight.state(part.sysid)
     status = state.companion.status or CompanionStatus(state=CompanionState.CONNECTING)
-    counted = flight.station.codec.sources.get((part.sysid, AUTOPILOT), SourceCount())
+    quality = flight.station.quality(part.sysid)
+    received, lost = (quality.received, quality.lost) if quality is not None else (0, 0)
     moved = flown.in_flight() if flown else Flown(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
     clearance_m = min_clearance_m(flight.mission, moved)
     landed = not state.armed
@@ -179,7 +178,7 @@ def _vehicle_report(flight: FleetFlight, part: VehicleFlight, flown: Flown | Non
         replan_ms_p50=status.replan_p50_ms,
         replan_ms_p99=status.replan_p99_ms,
         offboard_losses=part.monitor.offboard_losses,
-        link=LinkReport(sent=flight.station.sent[part.sysid], received=counted.received, lost=counted.lost),
+        link=LinkReport(sent=flight.station.sent[part.sysid], received=received, lost=lost),
     )
 
 

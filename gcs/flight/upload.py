@@ -1,49 +1,44 @@
-"""Missions and fences onto a vehicle, and certainty about what is stored: upload, read back, compare."""
+"""Missions, fences and rally points onto a vehicle, and certainty about what is stored."""
 
-import math
 from collections.abc import Sequence
 
 from gcs.dialect import AUTOPILOT
-from gcs.errors import MissionTransferError
-from gcs.microservices.mission_transfer_client import FENCE, MISSION, MissionDownload, MissionUpload
+from gcs.microservices.current_item import CurrentItem
+from gcs.microservices.mission_download import MissionDownload
+from gcs.microservices.mission_messages import MISSION
+from gcs.microservices.verified_upload import VerifiedUpload
 from gcs.station import Station
 from missions.mission_items import MissionItem
 
-ATTEMPTS = 3
 
-
-async def store(station: Station, sysid: int, items: Sequence[MissionItem], mission_type: int = MISSION) -> None:
+async def store(
+    station: Station, sysid: int, items: Sequence[MissionItem], mission_type: int = MISSION
+) -> VerifiedUpload:
     """Put items onto a vehicle and read them back; returns only when exactly these are stored.
 
     Raises:
-        MissionTransferError: refused, or something else is stored.
+        MissionTransferError: refused, or something else is stored; says which.
     """
-    peer = (sysid, AUTOPILOT)
-    difference = "nothing was sent"
-    for _ in range(ATTEMPTS):
-        await station.run(MissionUpload(items, peer, mission_type))
-        found = (await station.run(MissionDownload(peer, mission_type))).items
-        difference = first_difference(items, found, compare_altitude=mission_type != FENCE)
-        if not difference:
-            return
-    raise MissionTransferError(f"vehicle {sysid}: after {ATTEMPTS} uploads something else is stored: {difference}")
+    link = station.link_estimate(sysid)
+    return await station.run(VerifiedUpload(items, (sysid, AUTOPILOT), mission_type, link))
 
 
-def first_difference(
-    sent: Sequence[MissionItem], stored: Sequence[MissionItem], *, compare_altitude: bool = True
-) -> str:
-    """What differs between two lists of items, as a phrase; empty where they fly the same.
+async def swap(station: Station, sysid: int, items: Sequence[MissionItem], current: int = 0) -> None:
+    """Replace the mission of a vehicle in flight, and say which of its items is to be flown.
 
-    Frames of a fence and NaN yaws may come back changed; everything that is flown may not.
+    Raises:
+        MissionTransferError: the vehicle has not got the new mission; it flies on with the one it has.
+        LinkLost: it has, but does not confirm the current item.
     """
-    if len(sent) != len(stored):
-        return f"{len(stored)} items instead of {len(sent)}"
-    for seq, (ours, theirs) in enumerate(zip(sent, stored, strict=True)):
-        pairs = [("command", ours.command, theirs.command), ("x", ours.x, theirs.x), ("y", ours.y, theirs.y)]
-        pairs += [("param1", ours.param1, theirs.param1), ("param2", ours.param2, theirs.param2)]
-        if compare_altitude:
-            pairs += [("frame", ours.frame, theirs.frame), ("z", ours.z, theirs.z)]
-        for name, one, other in pairs:
-            if not math.isclose(one, other, rel_tol=1e-5, abs_tol=1e-4):
-                return f"item {seq}: {name} {other} instead of {one}"
-    return ""
+    stored = await store(station, sysid, items)
+    await station.run(CurrentItem((sysid, AUTOPILOT), current, stored.stored_id))
+
+
+async def read(station: Station, sysid: int, mission_type: int = MISSION) -> list[MissionItem]:
+    """What a vehicle has stored.
+
+    Raises:
+        MissionTransferError: refused, or no answer.
+    """
+    link = station.link_estimate(sysid)
+    return (await station.run(MissionDownload((sysid, AUTOPILOT), mission_type, link))).items

@@ -1,12 +1,15 @@
 """Datagrams <-> MAVLink messages: parsing that never raises, packing under our own identity, and counting."""
 
 import struct
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 from gcs.dialect import GCS_COMPONENT, GCS_SYSTEM, Message, mavlink
 from gcs.security.signing import Signing
 
 MAVLINK_2 = 0xFD
+MOST_SOURCES, MOST_LANES = 2048, 2048
+"""What strangers can make the station remember."""
 
 
 @dataclass
@@ -46,6 +49,7 @@ class Codec:
     def __post_init__(self) -> None:
         self._sender = mavlink.MAVLink(None, self.system, self.component)
         self._parser = _new_parser()
+        self._sequences: dict[Hashable, int] = {}
 
     def parse(self, datagram: bytes) -> list[Message]:
         """All well-formed MAVLink 2 messages of one datagram."""
@@ -60,15 +64,20 @@ class Codec:
             self._parser = _new_parser()
         return [message for message in messages if self._accept(message)]
 
-    def pack(self, message: Message, sysid: int = 0) -> bytes:
-        """The frame of a message of ours, with the next sequence number, signed if the vehicle `sysid` has a key."""
+    def pack(self, message: Message, sysid: int = 0, lane: Hashable = None) -> bytes:
+        """The frame of a message of ours, signed if the vehicle `sysid` has a key.
+
+        Each lane, which is a way to somebody, counts its own sequence numbers, from which its other end tells the loss.
+        """
         signature, key = self._sender.signing, self.signing.key(sysid)
         signature.sign_outgoing, signature.secret_key = key is not None, key
         if key is not None:
             signature.timestamp = self.signing.next_timestamp(sysid)
-        frame = message.pack(self._sender)
-        self._sender.seq = (self._sender.seq + 1) % 256
-        return bytes(frame)
+        if len(self._sequences) > MOST_LANES:
+            self._sequences.clear()
+        self._sender.seq = self._sequences.get(lane, 0)
+        self._sequences[lane] = (self._sender.seq + 1) % 256
+        return bytes(message.pack(self._sender))
 
     def _accept(self, message: Message) -> bool:
         frame = message.get_msgbuf()
@@ -78,7 +87,11 @@ class Codec:
         if not self.signing.admits(frame):
             return False
         seq, system, component = frame[4:7]  # from the frame: pymavlink leaves the header of unknown messages empty
-        self.sources.setdefault((system, component), SourceCount()).count(seq)
+        source = self.sources.get((system, component))
+        if source is None and len(self.sources) < MOST_SOURCES:
+            source = self.sources[system, component] = SourceCount()
+        if source is not None:
+            source.count(seq)
         return not message.get_type().startswith("UNKNOWN")
 
 

@@ -1,43 +1,48 @@
-"""UDP endpoints: the only sockets of the ground station's MAVLink."""
+"""UDP endpoints: `udpin` and `udpout`."""
 
 import asyncio
+import contextlib
 import socket
-from collections.abc import Callable
-from typing import cast
 
 from gcs.errors import UsageError
+from gcs.link.connection import Address, Receiver
 from gcs.link.url import LinkUrl, Scheme
-
-Address = tuple[str, int]
-Receiver = Callable[["UdpConnection", bytes, Address], None]
 
 RECEIVE_BUFFER_BYTES = 4 << 20
 """A fleet's telemetry arrives in bursts; the kernel's default buffer holds a few hundred datagrams."""
+LARGEST_DATAGRAM_BYTES = 65536
+MOST_AT_ONCE = 256
+"""Datagrams that are taken in before everything else has its turn."""
 
 
-class UdpConnection(asyncio.DatagramProtocol):
-    """One bound or connected datagram socket."""
+class UdpConnection:
+    """One bound datagram socket; all waiting datagrams are taken in at one wake-up of the event loop."""
 
-    def __init__(self, url: LinkUrl, receiver: Receiver) -> None:
+    def __init__(self, url: LinkUrl, receiver: Receiver, end: socket.socket) -> None:
         self.url = url
         self.peer: Address | None = (url.host, url.port) if url.scheme is Scheme.UDP_OUT else None
-        """Where to send before anybody was heard."""
-        self._receiver = receiver
-        self._transport: asyncio.DatagramTransport | None = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self._transport = cast(asyncio.DatagramTransport, transport)  # asyncio's own class does not derive from it
-
-    def datagram_received(self, data: bytes, addr: Address) -> None:
-        self._receiver(self, data, (addr[0], addr[1]))
+        self.budget_bytes_s = url.budget_bytes_s
+        self._receiver, self._end = receiver, end
+        asyncio.get_running_loop().add_reader(end, self._receive)
 
     def send(self, datagram: bytes, address: Address) -> None:
-        if self._transport is not None and not self._transport.is_closing():
-            self._transport.sendto(datagram, address)
+        with contextlib.suppress(OSError):  # no room, no route: lost, as on any link
+            self._end.sendto(datagram, address)
 
     def close(self) -> None:
-        if self._transport is not None:
-            self._transport.close()
+        if self._end.fileno() >= 0:
+            asyncio.get_running_loop().remove_reader(self._end)
+            self._end.close()
+
+    def _receive(self) -> None:
+        for _ in range(MOST_AT_ONCE):
+            try:
+                datagram, address = self._end.recvfrom(LARGEST_DATAGRAM_BYTES)
+            except ConnectionError:
+                continue  # an ICMP answer to what was sent to somebody who is gone
+            except OSError:
+                return
+            self._receiver(self, datagram, address)
 
 
 async def open_udp(url: LinkUrl, receiver: Receiver) -> UdpConnection:
@@ -46,16 +51,14 @@ async def open_udp(url: LinkUrl, receiver: Receiver) -> UdpConnection:
     Raises:
         UsageError: the address cannot be bound; names the port and why.
     """
-    loop = asyncio.get_running_loop()
     local = (url.host, url.port) if url.scheme is Scheme.UDP_IN else ("0.0.0.0", 0)
-    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    sock.setblocking(False)
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+    end = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    end.setblocking(False)
+    end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
     try:
-        sock.bind(local)
+        end.bind(local)
     except OSError as problem:
-        sock.close()
+        end.close()
         hint = "another ground station is running here, or end it first" if url.scheme is Scheme.UDP_IN else "no route"
         raise UsageError(f"cannot bind UDP {url.host}:{url.port}: {problem.strerror} ({hint})") from None
-    _, connection = await loop.create_datagram_endpoint(lambda: UdpConnection(url, receiver), sock=sock)
-    return connection
+    return UdpConnection(url, receiver, end)

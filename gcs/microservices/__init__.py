@@ -4,12 +4,12 @@ Each is started, given the messages of its peer and told when its deadline passe
 what is to be sent. It knows no socket, no clock and no event loop; `gcs.station` drives it.
 """
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 from gcs.dialect import Message
 
 
-class Microservice(Protocol):
+class Microservice(ABC):
     """One exchange with one component of one vehicle."""
 
     peer: tuple[int, int]
@@ -18,15 +18,28 @@ class Microservice(Protocol):
     """Names of the messages that this exchange reads."""
     deadline_s: float
     """When `handle_timeout` is due, on the clock of `now_s`."""
+    done: bool
+    turn: str | None = None
+    """Exchanges with the same turn and peer take place one after the other."""
+    makes_safe: bool = False
+    """Whether it may be sent also where it is not certain to whom."""
 
-    @property
-    def done(self) -> bool: ...
-
+    @abstractmethod
     def start(self, now_s: float) -> list[Message]: ...
 
+    @abstractmethod
     def receive(self, message: Message, now_s: float) -> list[Message]: ...
 
+    @abstractmethod
     def handle_timeout(self, now_s: float) -> list[Message]: ...
+
+    def abandon(self) -> list[Message]:
+        """What to send when the exchange is broken off before its end."""
+        return []
+
+    def replaced_by(self, newer: "Microservice") -> Exception | None:
+        """The error with which this exchange ends because `newer` is to take its place; None if it goes on."""
+        return None
 
 
 class Backoff:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from gcs.dialect import Message, enum_name, mavlink
 from gcs.errors import CommandRefused, LinkLost
-from gcs.microservices import Backoff
+from gcs.microservices import Backoff, Microservice
 from missions.frames import GeodeticPoint
 from missions.mission_items import DEG_E7
 
@@ -18,6 +18,13 @@ PROGRESS_TIMEOUT_S = 30.0
 """Patience once the other side has said that it is at work."""
 
 NAN = math.nan
+
+ONE_BY_ONE = frozenset({mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE})
+"""Their acknowledgements do not say which message was meant."""
+MAKING_SAFE = frozenset({mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH})
+"""Sent also where a second vehicle with the same system id is heard: to the one that was there first."""
+MOVING = MAKING_SAFE | {mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_DO_REPOSITION}
+"""Of these the last one that was given counts."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ class PlaceCommand(Command):
 
 
 @dataclass
-class CommandClient:
+class CommandClient(Microservice):
     """One command to one component.
 
     Raises:
@@ -63,9 +70,18 @@ class CommandClient:
     peer: tuple[int, int]
     done: bool = False
     deadline_s: float = math.inf
+    in_progress: bool = False
+    """The other side has said that it is at work."""
+    progress_percent: int | None = None
+    """How far, where it says so."""
     wants: frozenset[str] = frozenset({"COMMAND_ACK"})
     _confirmation: int = 0
     _backoff: Backoff = field(default_factory=lambda: Backoff(FIRST_TIMEOUT_S, ATTEMPTS))
+
+    def __post_init__(self) -> None:
+        number = self.command.number
+        self.turn = f"command {number}" if number in ONE_BY_ONE else None
+        self.makes_safe = number in MAKING_SAFE
 
     def start(self, now_s: float) -> list[Message]:
         self.deadline_s = now_s + self._backoff.take()
@@ -75,6 +91,8 @@ class CommandClient:
         if message.command != self.command.number or self.done:
             return []
         if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
+            self.in_progress = True
+            self.progress_percent = message.progress if message.progress <= 100 else None
             self.deadline_s = now_s + PROGRESS_TIMEOUT_S
             return []
         self.done = True
@@ -89,6 +107,15 @@ class CommandClient:
             raise LinkLost(f"{self}: no answer to {self._confirmation + 1} requests")
         self._confirmation = min(self._confirmation + 1, 255)
         return self.start(now_s)
+
+    def replaced_by(self, newer: Microservice) -> Exception | None:
+        """A newer order of the same kind must not be undone by a late repetition of the older one."""
+        if not isinstance(newer, CommandClient) or self.turn is not None or newer.peer != self.peer:
+            return None
+        same_kind = newer.command.number == self.command.number or {newer.command.number, self.command.number} <= MOVING
+        if not same_kind or newer.command == self.command:
+            return None
+        return CommandRefused(f"{self}: replaced by a newer order, {newer.command.name}")
 
     def __str__(self) -> str:
         return f"vehicle {self.peer[0]}: {self.command.name}"

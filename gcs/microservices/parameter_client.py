@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from gcs.dialect import Message, mavlink
 from gcs.errors import ParameterError
-from gcs.microservices import Backoff
+from gcs.microservices import Backoff, Microservice
 
 FIRST_TIMEOUT_S = 0.5
 ATTEMPTS = 8
@@ -19,7 +19,7 @@ Value = int | float
 
 
 @dataclass
-class ParameterExchange:
+class ParameterExchange(Microservice):
     """Read a parameter, or, given a value, set it and wait for the echo that shows the value stored.
 
     PX4 answers a wrong name, type or index with silence, so a set is preceded by a read, which tells the type.
@@ -42,14 +42,14 @@ class ParameterExchange:
         self.deadline_s = now_s + self._backoff.take()
         if self._type is None or self.new_value is None:
             return [mavlink.MAVLink_param_request_read_message(*self.peer, self.name.encode(), -1)]
-        encoded = _encode(self.new_value, self._type)
+        encoded = encode(self.new_value, self._type)
         return [mavlink.MAVLink_param_set_message(*self.peer, self.name.encode(), encoded, self._type)]
 
     def receive(self, message: Message, now_s: float) -> list[Message]:
         if message.param_id != self.name or self.done:
             return []
         first_answer, self._type = self._type is None, message.param_type
-        self.value = _decode(message.param_value, message.param_type)
+        self.value = decode(message)
         if self.new_value is None or _equal(self.value, self.new_value):
             self.done = True
             return []
@@ -71,13 +71,24 @@ def _equal(one: Value, other: Value) -> bool:
     return abs(one - other) <= TOLERANCE * max(1.0, abs(other))
 
 
-def _encode(value: Value, kind: int) -> float:
-    if kind == mavlink.MAV_PARAM_TYPE_INT32:
-        return struct.unpack("<f", struct.pack("<i", round(value)))[0]
+_VALUE_AT = 10
+"""Where the payload, whose first field is the value, begins in a MAVLink 2 frame."""
+_INTEGER_FORMATS = {
+    mavlink.MAV_PARAM_TYPE_INT32: "<i",
+    mavlink.MAV_PARAM_TYPE_UINT32: "<I",
+}
+
+
+def encode(value: Value, kind: int) -> float:
+    """A value as it travels, the bytes of an integer in those of a float32."""
+    if (layout := _INTEGER_FORMATS.get(kind)) is not None:
+        return struct.unpack("<f", struct.pack(layout, round(value)))[0]
     return float(value)
 
 
-def _decode(value: float, kind: int) -> Value:
-    if kind == mavlink.MAV_PARAM_TYPE_INT32:
-        return struct.unpack("<i", struct.pack("<f", value))[0]
-    return value
+def decode(message: Message, kind: int | None = None) -> Value:
+    """The value of a PARAM_VALUE; integers from the frame itself, since some are no float that Python would keep."""
+    layout = _INTEGER_FORMATS.get(message.param_type if kind is None else kind)
+    if layout is None:
+        return message.param_value
+    return struct.unpack_from(layout, message.get_msgbuf(), _VALUE_AT)[0]

@@ -12,8 +12,8 @@ Array = npt.NDArray[np.float64]
 
 PARALLEL = 1e-12
 """A direction's component below this never meets the planes across it."""
-STEEPEST_OF_GAUSSIAN = 0.857764
-"""sqrt(2 / e): the greatest slope of a Gaussian hill in units of height / x_s."""
+STEEPEST_AT = 0.707107
+"""A Gaussian hill is steepest so far from its axis, in units of x_s."""
 TOLERANCE_M = 1e-3
 MOST_STEPS = 1000
 
@@ -101,12 +101,9 @@ def _to_ball(o: Array, d: Array, ball: Array) -> float:
 
 @compiled
 def _to_ground(o: Array, d: Array, world: Obstacles, nearer_than: float) -> float:
-    """Flat ground at once; hills by steps that the steepest possible ground cannot overtake."""
-    peaks = world.peaks
-    steepest = 0.0
-    for k in range(len(peaks)):
-        steepest += STEEPEST_OF_GAUSSIAN * peaks[k, 3] / peaks[k, 2]
-    closing = steepest * np.sqrt(d[0] * d[0] + d[1] * d[1]) - d[2]
+    """Flat ground at once; hills by steps that the steepest ground along the ray cannot overtake."""
+    level = np.sqrt(d[0] * d[0] + d[1] * d[1])
+    closing = _steepest_along(o, d, world.peaks, level, nearer_than) * level - d[2]
     t = 0.0
     for _ in range(MOST_STEPS):
         gap = o[2] + t * d[2] - terrain_height_at(o[0] + t * d[0], o[1] + t * d[1], world)
@@ -118,3 +115,17 @@ def _to_ground(o: Array, d: Array, world: Obstacles, nearer_than: float) -> floa
         if t >= nearer_than:
             return np.inf
     return t
+
+
+@compiled
+def _steepest_along(o: Array, d: Array, peaks: Array, level: float, length_m: float) -> float:
+    """The ground below a ray is nowhere steeper than this: the peaks' slopes where it comes nearest to their axes."""
+    steepest = 0.0
+    for k in range(len(peaks)):
+        east, north, slope = o[0] - peaks[k, 0], o[1] - peaks[k, 1], peaks[k, 2]
+        along = 0.0 if level < PARALLEL else -(east * d[0] + north * d[1]) / (level * level)
+        along = min(max(along, 0.0), length_m)
+        nearest = np.hypot(east + along * d[0], north + along * d[1]) / slope
+        u = max(nearest, STEEPEST_AT)
+        steepest += 2.0 * u * peaks[k, 3] / slope * np.exp(-u * u)
+    return steepest

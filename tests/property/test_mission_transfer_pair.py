@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcs.errors import MissionTransferError
-from gcs.flight.upload import first_difference, store
-from gcs.microservices.mission_transfer_client import FENCE, MISSION, MissionDownload
+from gcs.flight.upload import store
+from gcs.microservices.mission_comparison import first_difference
+from gcs.microservices.mission_download import MissionDownload
+from gcs.microservices.mission_messages import FENCE, MISSION
 from missions.mission import LinkSettings, load_mission
 from missions.mission_items import MissionItem
 from tests.simulation import virtual_time
@@ -53,7 +55,7 @@ async def transfer(system: WholeSystem, items: list[MissionItem], kind: int) -> 
 def test_on_a_good_link_missions_and_fences_are_stored_as_sent(kind: int, items: list[MissionItem]):
     stored = virtual_time.run(transfer(system_with(LinkSettings(), 0), items, kind))
     assert stored is not None
-    assert first_difference(items, stored, compare_altitude=kind == MISSION) == ""
+    assert first_difference(items, stored, kind) == ""
 
 
 @given(

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from companion.errors import CommandRefused
-from companion.events import AutopilotFound, Event, FlightMode, Sender, StartCommanded
+from companion.events import AutopilotFound, Event, FlightMode, RingReported, Sender, StartCommanded
 from companion.instructions import CommandResult
 from companion.link.messages import EVENTS_OF, OdometryMessage
 from companion.setpoints import Setpoint
@@ -16,7 +16,7 @@ from gcs.errors import GcsError
 from gcs.flight import actions
 from gcs.link.codec import Codec
 from gcs.microservices.command_client import Command, CommandClient
-from gcs.microservices.mission_transfer_client import MissionDownload
+from gcs.microservices.mission_download import MissionDownload
 from gcs.station import Station
 from missions.mission_items import MissionItem
 from missions.tunnel import PayloadType, Reason
@@ -24,9 +24,16 @@ from sitl.microservices.outbox import Link
 from sitl.simulator import Simulator
 
 RATES_HZ = {331: 30.0, 436: 10.0, 245: 5.0, 242: 1.0}
+OBSTACLE_DISTANCE = 330
 GPS_GLOBAL_ORIGIN = 49
 HEARTBEAT_INTERVAL_S = 1.0
 YAW_RATE_IGNORED = 0x800
+ANSWERS = {0, 39, 40, 44, 47, 51, 73, 77}
+"""What microservices wait for: mission transfer and COMMAND_ACK; and HEARTBEAT, which says where to send to."""
+EVENTS = {
+    getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in (*EVENTS_OF, "ODOMETRY", "COMMAND_LONG", "OBSTACLE_DISTANCE")
+}
+"""What becomes events; everything else is not even decoded."""
 MODES = {
     FlightMode.OFFBOARD: Mode.OFFBOARD,
     FlightMode.HOLD: Mode.HOLD,
@@ -39,6 +46,7 @@ class OnboardWire:
     """The onboard link of one vehicle, in memory."""
 
     peer = None
+    budget_bytes_s = None
 
     def __init__(self, simulator: Simulator, sysid: int) -> None:
         self._simulator, self._sysid = simulator, sysid
@@ -50,8 +58,9 @@ class OnboardWire:
 class SimulatedAutopilot:
     """See `companion.link.autopilot.Autopilot`."""
 
-    def __init__(self, simulator: Simulator, sysid: int) -> None:
+    def __init__(self, simulator: Simulator, sysid: int, ring_hz: float = 0.0) -> None:
         self._sysid = sysid
+        self._rates_hz = RATES_HZ | ({OBSTACLE_DISTANCE: ring_hz} if ring_hz > 0.0 else {})
         self._peer = (sysid, AUTOPILOT)
         self._wire = OnboardWire(simulator, sysid)
         self._station = Station(codec=Codec(sysid, COMPANION))
@@ -64,10 +73,12 @@ class SimulatedAutopilot:
 
     def receive_frame(self, frame: bytes) -> None:
         """A frame that the vehicle has sent on its onboard link."""
+        message_id = int.from_bytes(frame[7:10], "little")
         if not self._tasks:
             return  # not opened yet, or closed
-        self._station.receive(self._wire, frame, ("onboard", self._sysid))
-        for message in self._reader.parse(frame):
+        if message_id in ANSWERS:
+            self._station.receive(self._wire, frame, ("onboard", self._sysid))
+        for message in self._reader.parse(frame) if message_id in EVENTS else []:
             if message.get_srcComponent() == AUTOPILOT:
                 self._read(message)
             elif message.get_type() == "COMMAND_LONG" and message.command == mavlink.MAV_CMD_MISSION_START:
@@ -134,7 +145,7 @@ class SimulatedAutopilot:
 
     async def _ask_for_streams(self) -> None:
         await self._found.wait()
-        for message_id, rate_hz in RATES_HZ.items():
+        for message_id, rate_hz in self._rates_hz.items():
             await self._command(actions.set_message_interval(message_id, rate_hz))
         await self._command(Command("request the origin", mavlink.MAV_CMD_REQUEST_MESSAGE, (float(GPS_GLOBAL_ORIGIN),)))
 
@@ -152,7 +163,9 @@ class SimulatedAutopilot:
         if name == "HEARTBEAT" and not self._found.is_set():
             self._found.set()
             self._events.put_nowait(AutopilotFound())
-        if name in EVENTS_OF:
+        if name == "OBSTACLE_DISTANCE" and OBSTACLE_DISTANCE in self._rates_hz:
+            self._events.put_nowait(RingReported(_as_mavsdk_has_it(message)))
+        elif name in EVENTS_OF:
             for event in EVENTS_OF[name](_as_mavsdk_has_it(message)):
                 self._events.put_nowait(event)
         elif name == "ODOMETRY":

@@ -4,11 +4,14 @@ import msgspec
 import numpy as np
 import pytest
 
+from gcs.flight.report import min_clearance_m
 from gcs.mapping.observed_map import ObservedMap
+from gcs.settings import PlanningMode
 from missions import obstacles
 from missions.mission import load_mission
 from missions.occupancy import OccupancyBlock, blocks_of, voxels_of
 from missions.world import Cylinder, World
+from tests.experiments.modes.scenarios import Difference, Link, scenario
 from tests.simulation.whole_system import WholeSystem
 
 INDOOR = load_mission("indoor")
@@ -78,3 +81,16 @@ def test_what_stands_in_nobodys_way_changes_nothing():
     report = system.fly()
     assert report.success, report.reason
     assert report.cloud_replans == 0
+
+
+@pytest.mark.slow
+def test_where_a_companion_alone_is_caught_in_a_dead_end_the_cloud_leads_it_out():
+    caught = scenario(Difference.DEAD_END, Link.GOOD, 0)
+    alone = WholeSystem(caught.mission, PlanningMode.ONBOARD, truth_mission=caught.truth)
+    assert not alone.fly().success
+    together = WholeSystem(caught.mission, PlanningMode.END_CLOUD, truth_mission=caught.truth)
+    report = together.fly()
+    assert report.success, report.reason
+    assert report.cloud_replans >= 1
+    for flown in together.flown().values():
+        assert min_clearance_m(caught.truth, flown.in_flight()) > INDOOR.limits.body_radius_m

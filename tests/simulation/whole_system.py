@@ -20,6 +20,7 @@ from companion.journal import Journal
 from companion.link.fleet_frames import FleetFrames
 from companion.pilot import Pilot
 from companion.planner.planner import Planner
+from companion.sensing.sensing import Sensing, driver_of, ring_hz_of
 from companion.settings import CompanionSettings
 from gcs.dialect import Mode
 from gcs.errors import GcsError
@@ -31,7 +32,7 @@ from gcs.planner.plan import FleetPlan
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.faults import Fault
-from missions.mission import Mission, Vehicle
+from missions.mission import Mission, SensorKind, Vehicle
 from sitl.fleet import TICK_S
 from sitl.microservices.outbox import Link
 from sitl.simulator import Simulator
@@ -48,6 +49,8 @@ def planned(mission_json: bytes, seed: int) -> FleetPlan:
     return plan_mission(msgspec.json.decode(mission_json, type=Mission), seed=seed)
 
 
+MOST_WAITING = 1000
+"""Datagrams of a lidar that nobody reads; as many fit into a socket's buffer."""
 PLANNING_TIME_S = 0.01
 """A companion's plan takes so long in vehicle time; it is made at once, so that no run depends on the machine."""
 
@@ -81,10 +84,22 @@ async def _work(call: Callable[[], T]) -> T:
     return result
 
 
+class LidarWire:
+    """The way from one vehicle's lidar to its companion, in memory."""
+
+    def __init__(self) -> None:
+        self.waiting: deque[bytes] = deque(maxlen=MOST_WAITING)
+
+    def poll(self) -> Iterator[bytes]:
+        while self.waiting:
+            yield self.waiting.popleft()
+
+
 class GroundWire:
     """The ground links of all vehicles, in memory: the station's connection to the simulator."""
 
     peer = None
+    budget_bytes_s = None
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
@@ -104,6 +119,7 @@ class WholeSystem:
         mission: what is flown.
         mode: who plans.
         seed: of planner and simulator.
+        sensor: what the companions see with.
         truth_mission: what the simulator has of the world; the mission, unless that is wrong about it.
     """
 
@@ -114,10 +130,13 @@ class WholeSystem:
     """(time [s], positions (n, 3), velocities (n, 3)) of every tick."""
 
     faults: tuple[Fault, ...] = ()
+    sensor: SensorKind = SensorKind.LIDAR
     truth_mission: Mission | None = None
 
     def __post_init__(self) -> None:
-        self.simulator = Simulator(self.truth_mission or self.mission, seed=self.seed)
+        looking = self.mode.needs_companions and self.sensor is not SensorKind.NONE
+        self.simulator = Simulator(self.truth_mission or self.mission, seed=self.seed, lidar=looking)
+        self.lidars = {vehicle.sysid: LidarWire() for vehicle in self.mission.vehicles}
         self.station = Station(unix_us=lambda: 0)
         self.wire = GroundWire(self.simulator)
         self.station.connections.append(self.wire)
@@ -172,11 +191,15 @@ class WholeSystem:
     async def _companion(self, vehicle: Vehicle) -> None:
         """One companion, until it is cancelled or a fault ends it."""
         mission = self.companion_missions[vehicle.sysid]
-        settings = CompanionSettings(vehicle=vehicle.sysid, system_url="", seed=self.seed)
+        settings = CompanionSettings(vehicle=vehicle.sysid, system_url="", seed=self.seed, sensor=self.sensor)
         zones_m = np.array([mission.start_m(vehicle), *(target.position_m for target in mission.targets)])
         rng = np.random.default_rng(self.seed)
         planner = Planner(mission, settings.reserve, settings.search, rng, zones_m)
-        autopilot = self.autopilots[vehicle.sysid] = SimulatedAutopilot(self.simulator, vehicle.sysid)
+        driver = driver_of(settings.sensor, mission)
+        sensing = driver and Sensing(driver, mission.sensor.rate_hz, self.lidars[vehicle.sysid].poll)
+        autopilot = self.autopilots[vehicle.sysid] = SimulatedAutopilot(
+            self.simulator, vehicle.sysid, ring_hz_of(settings.sensor, mission)
+        )
         fleet = self._fleet_desk(mission, vehicle.sysid)
         companion = App(
             settings,
@@ -187,6 +210,7 @@ class WholeSystem:
             NoDeadMan(),
             Mortality(self.faults, vehicle.sysid),
             Journal(vehicle.sysid, None, say=lambda _: None),
+            sensing,
             fleet=fleet,
             cpu_clock=lambda: 0.0,
         )
@@ -220,6 +244,8 @@ class WholeSystem:
                     self.station.receive(self.wire, frame, ("simulator", sysid))
                 elif sysid in self.autopilots:
                     self.autopilots[sysid].receive_frame(frame)
+            for sysid, datagram in self.simulator.lidar_datagrams():
+                self.lidars[sysid].waiting.append(datagram)
             for sysid, datagram in self.simulator.radio_datagrams():
                 if sysid in self.radio_inboxes:
                     self.radio_inboxes[sysid].append(datagram)

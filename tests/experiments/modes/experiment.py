@@ -12,13 +12,13 @@ from gcs.experiments.markdown import table
 from gcs.experiments.statistics import numbers, select, share, spread
 from gcs.flight.report import min_clearance_m
 from gcs.settings import PlanningMode
-from tests.experiments.modes.scenarios import Link, World, scenario
+from tests.experiments.modes.scenarios import Difference, Link, scenario
 from tests.simulation.whole_system import WholeSystem
 
 MODES = (PlanningMode.END_CLOUD, PlanningMode.CLOUD, PlanningMode.ONBOARD)
 COLOURS = {PlanningMode.END_CLOUD: "#c1272d", PlanningMode.CLOUD: "#0000a7", PlanningMode.ONBOARD: "#008176"}
 MODE_NAMES = {mode.value: mode for mode in MODES}
-MISLED = (World.MISSING, World.MOVED, World.DEAD_END)
+MISLED = (Difference.MISSING, Difference.MOVED, Difference.DEAD_END)
 SLACK = 0.02
 """End-cloud may be this much less successful than the better of the other two."""
 
@@ -27,7 +27,7 @@ def runs(seeds: Sequence[int]) -> list[Run]:
     """Seed by seed."""
     return product(
         seed=list(seeds),
-        world=[world.name for world in World],
+        world=[world.name for world in Difference],
         link=[link.name for link in Link],
         mode=[mode.value for mode in MODES],
     )
@@ -35,7 +35,7 @@ def runs(seeds: Sequence[int]) -> list[Run]:
 
 def work(run: Run) -> Row:
     """Fly once."""
-    flown = scenario(World[run.text("world")], Link[run.text("link")], run.number("seed"))
+    flown = scenario(Difference[run.text("world")], Link[run.text("link")], run.number("seed"))
     mode = MODE_NAMES[run.text("mode")]
     system = WholeSystem(flown.mission, mode, seed=run.number("seed"), truth_mission=flown.truth)
     report = system.fly()
@@ -59,7 +59,7 @@ def work(run: Run) -> Row:
 def shortfalls(rows: Sequence[Row]) -> list[str]:
     """What the experiment promises and did not show, a line each; none if all is well."""
     found: list[str] = []
-    for world, link in combinations(World, Link):
+    for world, link in combinations(Difference, Link):
         cell = select(rows, world=world.name, link=link.name)
         rates = {
             mode: share(select(cell, mode=mode.value), "success") for mode in MODES if select(cell, mode=mode.value)
@@ -90,7 +90,7 @@ def summary(rows: Sequence[Row]) -> str:
         "kB",
         "swap s",
     ]
-    lines = [_line(rows, *cell) for cell in combinations(World, Link, MODES)]
+    lines = [_line(rows, *cell) for cell in combinations(Difference, Link, MODES)]
     preface = (
         "Two vehicles in the paper's room, its obstacles moved by the seed; a pillar that the map lacks or has "
         "elsewhere stands on the way that the cloud plans; the dead end is a pocket of three walls. All flights in "
@@ -109,12 +109,12 @@ def figures(rows: Sequence[Row], directory: Path) -> list[str]:
     with picture(directory / "modes.png", 9.0, 3.0) as figure:
         for axes, link in zip(figure.subplots(1, len(Link), sharey=True), Link, strict=True):
             for offset, mode in enumerate(MODES):
-                cells = [select(rows, world=world.name, link=link.name, mode=mode.value) for world in World]
+                cells = [select(rows, world=world.name, link=link.name, mode=mode.value) for world in Difference]
                 heights = [100.0 * share(cell, "success") if cell else 0.0 for cell in cells]
-                places = np.arange(len(World)) + 0.27 * (offset - 1)
+                places = np.arange(len(Difference)) + 0.27 * (offset - 1)
                 axes.bar(places, heights, 0.25, color=COLOURS[mode], label=mode.value)
             axes.set_xticks(
-                range(len(World)), [world.value.replace(" from the map", "") for world in World], fontsize=6
+                range(len(Difference)), [world.value.replace(" from the map", "") for world in Difference], fontsize=6
             )
             axes.set_title(link.value, fontsize=8)
         axes.legend(fontsize=6)
@@ -122,7 +122,7 @@ def figures(rows: Sequence[Row], directory: Path) -> list[str]:
     return ["modes.png"]
 
 
-def _line(rows: Sequence[Row], world: World, link: Link, mode: PlanningMode) -> list[str]:
+def _line(rows: Sequence[Row], world: Difference, link: Link, mode: PlanningMode) -> list[str]:
     cell = select(rows, world=world.name, link=link.name, mode=mode.value)
     if not cell:
         return [world.value, link.value, mode.value, "0", *["–"] * 7]
@@ -143,7 +143,7 @@ def _line(rows: Sequence[Row], world: World, link: Link, mode: PlanningMode) -> 
 
 
 def _name(row: Row) -> str:
-    return f"{World[str(row['world'])].value}, {Link[str(row['link'])].value}, {row['mode']}, seed {row['seed']}"
+    return f"{Difference[str(row['world'])].value}, {Link[str(row['link'])].value}, {row['mode']}, seed {row['seed']}"
 
 
 EXPERIMENT = Experiment(

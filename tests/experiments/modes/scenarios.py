@@ -20,7 +20,7 @@ POCKET_WIDTH_M = (5.0, 7.0)
 WALL_HALF_M = 0.15
 
 
-class World(Enum):
+class Difference(Enum):
     """How the world differs from its map."""
 
     AS_MAPPED = "map right"
@@ -52,17 +52,17 @@ class Scenario:
     truth: Mission
 
 
-def scenario(world: World, link: Link, seed: int) -> Scenario:
+def scenario(world: Difference, link: Link, seed: int) -> Scenario:
     """The scenario of a seed: the same world for every mode and link."""
-    rng = np.random.default_rng([seed, list(World).index(world)])
+    rng = np.random.default_rng([seed, list(Difference).index(world)])
     mission = _jittered(load_mission("indoor"), rng)
     truth = mission
     match world:
-        case World.MISSING:
+        case Difference.MISSING:
             truth = _with(mission, cylinders=(*mission.world.cylinders, _in_the_way(mission, rng)))
-        case World.MOVED:
+        case Difference.MOVED:
             truth = _with(mission, cylinders=(_in_the_way(_with(mission, cylinders=()), rng),))
-        case World.DEAD_END:
+        case Difference.DEAD_END:
             mission = _with(mission, boxes=(), cylinders=())
             truth = _with(mission, boxes=_pocket(rng))
     ground_link = LINKS[link]

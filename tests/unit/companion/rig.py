@@ -77,6 +77,7 @@ class Rig:
     answers_plans: bool = True
     follows: bool = True
     """The vehicle does what its setpoints say."""
+    sensor_silent: bool = False
     planner: Any = None
 
     def __post_init__(self) -> None:
@@ -107,7 +108,7 @@ class Rig:
         while self.now_s < end_s and not until():
             self.now_s += 0.02
             n_before = len(out)
-            out += self.feed(self.odometry(), events.Tick(0.0))
+            out += self.feed(self.odometry(), events.Tick(0.0, sensor_silent=self.sensor_silent))
             for wanted in of(out[n_before:], instructions.RequestPlan) if self.answers_plans else []:
                 out += self.feed(self.answer(wanted.request))
         return out

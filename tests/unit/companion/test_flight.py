@@ -7,8 +7,9 @@ from companion import events, instructions
 from companion.events import FlightMode
 from companion.settings import PilotSettings
 from missions.mission_items import MissionItem, plan_id
+from missions.trajectory import Trajectory
 from missions.tunnel import CompanionState, Reason, TrajectoryKind
-from tests.unit.companion.rig import HOME, TRACK_M, Rig, items_of, of
+from tests.unit.companion.rig import HOME, TRACK_M, Rig, StraightPlanner, items_of, of
 
 State = CompanionState
 SETTINGS = PilotSettings()
@@ -104,6 +105,74 @@ def test_a_trajectory_that_is_blocked_is_braked_on_at_once():
     positions, velocities = setpoints(flown)
     assert np.linalg.norm(positions[-1] - positions[0]) < speed_m_s**2 / 2.0 + 0.5
     np.testing.assert_allclose(velocities[-1], 0.0, atol=1e-9)
+
+
+class SeesAhead(StraightPlanner):
+    """What is flown turns out to be blocked from `conflict_at_s` on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.blocked: Trajectory | None = None
+        self.conflict_at_s = np.inf
+
+    def conflict_s(self, trajectory: Trajectory, now_s: float) -> float:
+        return self.conflict_at_s if trajectory is self.blocked else np.inf
+
+
+def blocked_ahead(in_s: float) -> Rig:
+    """A second and a half on its way, a vehicle whose trajectory turns out to be blocked; it gets no answers."""
+    planner = SeesAhead()
+    rig = Rig(planner=planner).flying()
+    rig.run(1.5)
+    assert rig.pilot._flight is not None
+    rig.answers_plans, planner.blocked = False, rig.pilot._flight.course.latest
+    planner.conflict_at_s = rig.now_s + in_s
+    return rig
+
+
+def test_blocked_ahead_it_plans_at_once_and_flies_on_while_it_could_still_stop():
+    rig = blocked_ahead(in_s=2.5)
+    happened = rig.run(0.3)
+    (wanted,) = of(happened, instructions.RequestPlan)
+    assert rig.pilot.state is State.FLYING
+    rig.now_s -= 0.25
+    replans = rig.pilot.figures.replans
+    rig.feed(rig.answer(wanted.request))
+    assert rig.pilot.figures.replans == replans + 1
+    assert_smooth(happened)
+
+
+def test_blocked_ahead_without_an_answer_it_brakes_before_it_is_too_late():
+    rig = blocked_ahead(in_s=1.8)
+    rig.run(0.2)
+    assert rig.pilot.state is State.FLYING
+    rig.run(1.6, until=lambda: rig.pilot.state is State.HOLDING)
+    assert (rig.pilot.state, rig.pilot.reason) == (State.HOLDING, Reason.NO_PATH)
+    speed_m_s = np.linalg.norm(rig.velocity_ned_m_s)
+    assert speed_m_s > 1.0
+    assert rig.planner.conflict_at_s - rig.now_s > speed_m_s / rig.planner.limits.acceleration_m_s2
+    assert_smooth(rig.run(3.0))
+
+
+def test_a_plan_that_has_not_begun_yet_is_judged_itself_and_not_replaced():
+    rig = blocked_ahead(in_s=2.5)
+    rig.answers_plans = True
+    assert len(of(rig.run(0.2), instructions.RequestPlan)) == 1
+    assert rig.pilot.state is State.FLYING
+
+
+def test_when_the_sensor_falls_silent_it_brakes_and_goes_on_when_it_is_heard_again():
+    rig = Rig().flying()
+    rig.run(1.5)
+    rig.sensor_silent = True
+    silent = rig.run(3.0)
+    assert (rig.pilot.state, rig.pilot.reason) == (State.HOLDING, Reason.NO_SENSOR)
+    assert not of(silent, instructions.RequestPlan)
+    assert "sensor silent" in [note.text for note in of(silent, instructions.Note)]
+    np.testing.assert_allclose(setpoints(silent)[1][-1], 0.0, atol=1e-9)
+    rig.sensor_silent = False
+    assert_smooth(rig.run(3.0))
+    assert rig.pilot.state is State.FLYING
 
 
 def test_without_odometry_it_brakes_and_goes_on_when_there_is_some_again():

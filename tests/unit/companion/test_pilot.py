@@ -446,3 +446,14 @@ def test_trajectories_are_announced_in_utc():
     assert first.message.kind is TrajectoryKind.COMMITTED
     assert first.message.trajectory.start_s == pytest.approx(rig.now_s + 1.7e9)
     assert first.message.plan_id == plan_id(items_of())
+
+
+def test_a_vehicle_that_cannot_see_is_not_ready_and_refuses_to_start():
+    rig = Rig(sensor_silent=True).airborne()
+    rig.run(0.1)
+    assert (rig.pilot.state, rig.pilot.reason) == (State.WAITING, Reason.NO_SENSOR)
+    (answer,) = of(rig.start(), instructions.AcknowledgeStart)
+    assert (answer.result, answer.reason) == (CommandResult.TEMPORARILY_REJECTED, Reason.NO_SENSOR)
+    rig.sensor_silent = False
+    rig.run(0.1)
+    assert (rig.pilot.state, rig.pilot.reason) == (State.READY, Reason.NONE)

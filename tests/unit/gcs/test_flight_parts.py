@@ -13,7 +13,7 @@ from gcs.flight.events import EventLog, Severity
 from gcs.flight.fence import fence_height_m, fence_items
 from gcs.flight.report import TRUTH_HEADER, Flown, min_separation_m, read_truth
 from gcs.flight.safety_parameters import requirements
-from gcs.flight.upload import first_difference
+from gcs.microservices.mission_comparison import first_difference
 from missions.mission import load_mission
 from missions.mission_items import Track, encode_track
 from tests.unit.gcs import messages as mav

@@ -6,18 +6,15 @@ import struct
 import pytest
 
 from gcs.dialect import mavlink
-from gcs.errors import CommandRefused, LinkLost, MissionTransferError, ParameterError
+from gcs.errors import CommandRefused, LinkLost, ParameterError
 from gcs.flight import actions
 from gcs.microservices.command_client import ATTEMPTS, PROGRESS_TIMEOUT_S, CommandClient
-from gcs.microservices.mission_transfer_client import MissionDownload, MissionUpload, item_message
 from gcs.microservices.parameter_client import ParameterExchange
 from missions.frames import GeodeticPoint
-from missions.mission_items import MissionItem
 from tests.unit.gcs.messages import command_ack, from_autopilot
 
 PEER = (1, 1)
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-ITEMS = [MissionItem(command=16, x=index, y=2 * index, z=10.0 + index, param2=0.3) for index in range(3)]
 
 
 def sent(messages: list) -> list[str]:
@@ -28,15 +25,6 @@ def time_out(service, times: int = 30) -> None:
     """Let deadline after deadline pass."""
     for _ in range(times):
         service.handle_timeout(service.deadline_s)
-
-
-def request(seq: int, *, legacy: bool = False):
-    kind = mavlink.MAVLink_mission_request_message if legacy else mavlink.MAVLink_mission_request_int_message
-    return from_autopilot(kind(255, 190, seq, 0))
-
-
-def mission_ack(result: int = 0):
-    return from_autopilot(mavlink.MAVLink_mission_ack_message(255, 190, result, 0))
 
 
 # ------------------------------------------------------------------ commands
@@ -151,127 +139,6 @@ def test_a_parameter_that_does_not_take_the_value_is_an_error_that_shows_both():
     exchange.receive(integer("NAV_DLL_ACT", 2), 0.1)
     with pytest.raises(ParameterError, match="expected 0 to be stored, found 2"):
         time_out(exchange)
-
-
-# ------------------------------------------------------------------ missions
-
-
-@pytest.mark.parametrize("legacy", [True, False])
-def test_an_upload_answers_requests_of_both_kinds_with_int_items(legacy: bool):
-    upload = MissionUpload(ITEMS, PEER)
-    assert sent(upload.start(0.0)) == ["MISSION_COUNT"]
-    for seq, item in enumerate(ITEMS):
-        (answer,) = upload.receive(request(seq, legacy=legacy), 0.1)
-        assert (answer.get_type(), answer.seq, answer.x, answer.current) == (
-            "MISSION_ITEM_INT",
-            seq,
-            item.x,
-            int(seq == 0),
-        )
-    upload.receive(mission_ack(), 0.2)
-    assert upload.done
-    assert upload.acknowledged
-
-
-def test_a_lost_count_is_repeated_and_a_repeated_request_answered_again():
-    upload = MissionUpload(ITEMS, PEER)
-    upload.start(0.0)
-    assert sent(upload.handle_timeout(upload.deadline_s)) == ["MISSION_COUNT"]
-    first = upload.receive(request(0), 1.0)
-    again = upload.receive(request(0), 1.3)
-    assert sent(first) == sent(again) == ["MISSION_ITEM_INT"]
-
-
-def test_a_missing_final_acknowledgement_ends_the_upload_unacknowledged():
-    upload = MissionUpload(ITEMS, PEER)
-    upload.start(0.0)
-    for seq in range(3):
-        upload.receive(request(seq), 0.1)
-    assert upload.handle_timeout(upload.deadline_s) == []
-    assert upload.done
-    assert not upload.acknowledged
-
-
-def test_an_old_acceptance_does_not_end_a_new_upload():
-    upload = MissionUpload(ITEMS, PEER)
-    upload.start(0.0)
-    upload.receive(mission_ack(), 0.1)
-    assert not upload.done
-
-
-def test_a_busy_vehicle_is_asked_again_and_a_refusal_is_named():
-    upload = MissionUpload(ITEMS, PEER)
-    upload.start(0.0)
-    upload.receive(mission_ack(mavlink.MAV_MISSION_ERROR), 0.1)
-    assert sent(upload.handle_timeout(upload.deadline_s)) == ["MISSION_COUNT"]
-    with pytest.raises(MissionTransferError, match="refused: MAV_MISSION_NO_SPACE"):
-        upload.receive(mission_ack(mavlink.MAV_MISSION_NO_SPACE), 2.0)
-
-
-def test_an_error_about_a_straggler_does_not_end_a_transfer():
-    upload = MissionUpload(ITEMS, PEER)
-    upload.start(0.0)
-    upload.receive(request(0), 0.1)
-    upload.receive(mission_ack(mavlink.MAV_MISSION_ERROR), 0.2)
-    assert sent(upload.receive(request(1), 0.3)) == ["MISSION_ITEM_INT"]
-    download = MissionDownload(PEER)
-    download.start(0.0)
-    download.receive(mission_ack(mavlink.MAV_MISSION_ERROR), 0.1)
-    assert not download.done
-
-
-def test_requests_beyond_the_end_are_ignored():
-    upload = MissionUpload(ITEMS, PEER)
-    upload.start(0.0)
-    assert upload.receive(request(7), 0.1) == []
-
-
-def test_a_silent_vehicle_ends_the_upload_with_how_far_it_got():
-    upload = MissionUpload(ITEMS, PEER)
-    upload.start(0.0)
-    upload.receive(request(0), 0.1)
-    with pytest.raises(MissionTransferError, match="no answer after 1 of 3 items"):
-        time_out(upload)
-
-
-def test_a_download_asks_item_by_item_and_again_for_what_is_lost():
-    download = MissionDownload(PEER)
-    assert sent(download.start(0.0)) == ["MISSION_REQUEST_LIST"]
-    download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 3, 0)), 0.1)
-    for seq in range(3):
-        (again,) = download.handle_timeout(download.deadline_s)
-        assert (again.get_type(), again.seq) == ("MISSION_REQUEST_INT", seq)
-        answer = download.receive(from_autopilot(item_message(ITEMS[seq], seq, (255, 190), 0)), 0.2)
-        download.receive(from_autopilot(item_message(ITEMS[seq], seq, (255, 190), 0)), 0.2)
-    assert sent(answer) == ["MISSION_ACK"]
-    assert [(item.x, item.z) for item in download.items] == [(item.x, item.z) for item in ITEMS]
-
-
-def test_a_download_that_the_vehicle_has_forgotten_begins_again():
-    download = MissionDownload(PEER)
-    download.start(0.0)
-    download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 3, 0)), 0.1)
-    download.receive(from_autopilot(item_message(ITEMS[0], 0, (255, 190), 0)), 0.2)
-    asked = [sent(download.handle_timeout(download.deadline_s)) for _ in range(7)]
-    assert asked[:5] == [["MISSION_REQUEST_INT"]] * 5
-    assert download.deadline_s > 5.0  # a PX4 has given up by then
-    assert asked[6] == ["MISSION_REQUEST_LIST"]
-    assert download.items == []
-
-
-def test_an_empty_vehicle_downloads_as_empty():
-    download = MissionDownload(PEER)
-    download.start(0.0)
-    download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 0, 0)), 0.1)
-    assert download.done
-    assert download.items == []
-
-
-def test_an_absurd_count_is_refused():
-    download = MissionDownload(PEER)
-    download.start(0.0)
-    with pytest.raises(MissionTransferError, match="65535 items"):
-        download.receive(from_autopilot(mavlink.MAVLink_mission_count_message(255, 190, 65535, 0)), 0.1)
 
 
 def test_a_place_travels_as_integers_and_its_altitude_amsl():

@@ -198,8 +198,8 @@ def test_who_falls_silent_grows_is_never_dropped_and_does_not_fill_the_room():
     body_m = ROOM.limits.body_radius_m
     assert radii == sorted(radii)
     assert radii[0] == body_m < radii[3]
-    assert radii[-1] == body_m + 1.5
-    assert others[-1].distance_m(ROOM.limits) == ROOM.limits.separation_m + 1.5
+    assert radii[-1] == body_m + 0.75
+    assert others[-1].distance_m(ROOM.limits) == ROOM.limits.separation_m + 0.75
 
 
 def test_who_does_not_fly_what_it_said_is_where_it_says_it_is():

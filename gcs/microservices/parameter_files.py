@@ -1,0 +1,77 @@
+"""QGroundControl's `.params` files, and what differs between one and a vehicle.
+
+A line is system id, component id, name, value and MAV_PARAM_TYPE, separated by tabs; `#` begins a comment.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from gcs.dialect import AUTOPILOT, mavlink
+from gcs.errors import ParameterError
+from gcs.microservices.parameter_client import Value
+from gcs.microservices.parameter_fetch import Parameter
+
+RELATIVE_TOLERANCE = 1e-6
+_INTEGERS = frozenset(range(mavlink.MAV_PARAM_TYPE_UINT8, mavlink.MAV_PARAM_TYPE_INT64 + 1))
+
+
+@dataclass(frozen=True)
+class ParameterDifference:
+    """One parameter that is not as in a file; None where one side has none of that name."""
+
+    name: str
+    in_file: Value | None
+    on_vehicle: Value | None
+
+    def __str__(self) -> str:
+        return f"{self.name}: {_shown(self.in_file)} in the file, {_shown(self.on_vehicle)} on the vehicle"
+
+
+def read_parameters(text: str, name: str = "parameters") -> dict[str, Parameter]:
+    """The autopilot's parameters of a file; other components' are left out.
+
+    Raises:
+        ParameterError: a line that is none; names file, line, what was expected and found.
+    """
+    found: dict[str, Parameter] = {}
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip() and not line.startswith("#"):
+            key, component, parameter = _read_line(line, f"{name}:{number}")
+            if component == AUTOPILOT:
+                found[key] = parameter
+    return found
+
+
+def write_parameters(parameters: Mapping[str, Parameter], sysid: int) -> str:
+    """The text of a file."""
+    rows = (f"{sysid}\t{AUTOPILOT}\t{name}\t{p.value!r}\t{p.kind}\n" for name, p in sorted(parameters.items()))
+    return "# Vehicle-Id Component-Id Name Value Type\n" + "".join(rows)
+
+
+def parameter_differences(
+    in_file: Mapping[str, Parameter], on_vehicle: Mapping[str, Parameter]
+) -> Iterator[ParameterDifference]:
+    """Yield what the file has and the vehicle has not, or has otherwise; what the file does not name is left alone."""
+    for name, wanted in sorted(in_file.items()):
+        found = on_vehicle.get(name)
+        if found is None:
+            yield ParameterDifference(name, wanted.value, None)
+        elif not math.isclose(wanted.value, found.value, rel_tol=RELATIVE_TOLERANCE, abs_tol=1e-9):
+            yield ParameterDifference(name, wanted.value, found.value)
+
+
+def _read_line(line: str, where: str) -> tuple[str, int, Parameter]:
+    fields = line.split("\t") if "\t" in line else line.split()
+    try:
+        _, component, name, value, kind = fields
+        parsed: Value = int(value) if int(kind) in _INTEGERS else float(value)
+        if not math.isfinite(parsed):
+            raise ValueError
+        return name, int(component), Parameter(parsed, int(kind))
+    except ValueError:
+        raise ParameterError(f"{where}: expected system, component, name, value, type; found {line!r}") from None
+
+
+def _shown(value: Value | None) -> str:
+    return "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

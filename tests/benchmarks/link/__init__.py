@@ -1,0 +1,1 @@
+"""The ground link's benchmark: `make bench-link`."""
