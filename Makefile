@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes fuzz check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes fuzz bench-view screenshots check format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -47,6 +47,12 @@ test-all: $(VENV)/.installed-dev  ## every test, the slow ones too
 
 bench-sitl: $(VENV)/.installed-dev  ## what the simulator costs: CPU, memory, pace, boot, with the required figures
 	$(BIN)/python -m tests.benchmarks.sitl
+
+bench-view: $(VENV)/.installed-dev  ## what the web page costs at 100 vehicles: CPU, traffic, reload, with the required figures
+	$(BIN)/python -m tests.benchmarks.view $(BENCH)
+
+screenshots: $(VENV)/.installed-dev  ## the pictures of the web page in docs/images
+	$(BIN)/python -m tests.browser.screenshots
 
 check-px4: install  ## fly the whole sequence on an autopilot that is there: make check-px4 LINK=udpin://0.0.0.0:14550
 	@test -n "$(LINK)" || { echo "usage: make check-px4 LINK=udpin://0.0.0.0:14550 [SPEED=1]"; exit 2; }

@@ -65,6 +65,7 @@ class Station:
         self._turns: dict[tuple[tuple[int, int], str], asyncio.Lock] = {}
         self._shapers: dict[Connection, Shaper] = {}
         self._pumping: set[Connection] = set()
+        self._numbers: dict[Connection, int] = {}
 
     def receive(self, connection: Connection, datagram: bytes, address: Address) -> None:
         """Take in one datagram."""
@@ -210,17 +211,23 @@ class Station:
         connection, address = way
         if self.audit is not None:
             self.audit.sent(message, sysid)
-        frame = self.codec.pack(message, sysid, lane=way)
+        bulk = message.get_type() in BULK
+        frame = self.codec.pack(message, sysid, lane=way, link_id=self._link_id(connection, bulk))
         if self.recording is not None:
             self.recording.write(frame, self.unix_us())
         if connection.budget_bytes_s is None:
             connection.send(frame, address)
             return
         shaper = self._shapers.setdefault(connection, Shaper(connection.budget_bytes_s))
-        urgency = Urgency.BULK if message.get_type() in BULK else Urgency.CONTROL
+        urgency = Urgency.BULK if bulk else Urgency.CONTROL
         for due, where in shaper.offer(frame, address, urgency, self.now_s):
             connection.send(due, where)
         self._pump_later(connection, shaper)
+
+    def _link_id(self, connection: Connection, bulk: bool) -> int:
+        """The signing stream of a frame: what may overtake, or comes over another link, has timestamps of its own."""
+        number = self._numbers.setdefault(connection, len(self._numbers))
+        return (2 * number + bulk) % 256
 
     def _pump_later(self, connection: Connection, shaper: Shaper) -> None:
         wait_s = shaper.wait_s

@@ -64,15 +64,16 @@ class Codec:
             self._parser = _new_parser()
         return [message for message in messages if self._accept(message)]
 
-    def pack(self, message: Message, sysid: int = 0, lane: Hashable = None) -> bytes:
+    def pack(self, message: Message, sysid: int = 0, lane: Hashable = None, link_id: int = 0) -> bytes:
         """The frame of a message of ours, signed if the vehicle `sysid` has a key.
 
         Each lane, which is a way to somebody, counts its own sequence numbers, from which its other end tells the loss.
+        Frames of one `link_id` must arrive in order where they are signed: their timestamps rise.
         """
         signature, key = self._sender.signing, self.signing.key(sysid)
         signature.sign_outgoing, signature.secret_key = key is not None, key
         if key is not None:
-            signature.timestamp = self.signing.next_timestamp(sysid)
+            signature.timestamp, signature.link_id = self.signing.next_timestamp(sysid), link_id
         if len(self._sequences) > MOST_LANES:
             self._sequences.clear()
         self._sender.seq = self._sequences.get(lane, 0)

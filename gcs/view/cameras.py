@@ -35,10 +35,15 @@ class Cameras:
     """
 
     def __init__(self, server: viser.ViserServer, low_m: Array, high_m: Array, vehicles: int) -> None:
-        self._server, self._low_m, self._high_m, self._vehicles = server, low_m, high_m, vehicles
+        self._server, self._vehicles = server, vehicles
         self._followed: dict[int, int] = {}
+        self.frame(low_m, high_m)
+
+    def frame(self, low_m: Array, high_m: Array) -> None:
+        """What `overview` and `from_above` show from now on, and browsers that come, at first."""
+        self._low_m, self._high_m = low_m, high_m
         first = self._framed(FROM_SOUTH_WEST, FIRST_ASPECT, FIRST_HEIGHT_PX)
-        camera = server.initial_camera
+        camera = self._server.initial_camera
         camera.position, camera.look_at = first.position_m, first.look_at_m
         camera.fov, camera.near = FOV_RAD, NEAR_M
         camera.far = FAR_SIZES * float(np.linalg.norm(high_m - low_m))

@@ -52,6 +52,7 @@ def vehicle_colour(index: int) -> Rgb:
     return round(red * 255), round(green * 255), round(blue * 255)
 
 
+@cache
 def css(colour: Rgb) -> str:
     """The colour as CSS writes it."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

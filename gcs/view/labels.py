@@ -5,7 +5,7 @@ Pixels are counted from the picture's upper left corner, x to the right and y do
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,7 @@ class Lens:
     width_px: int
     height_px: int
 
-    @property
+    @cached_property
     def axes(self) -> Array:
         """(3, 3) unit vectors to the right, upwards and towards the camera."""
         return np.array(camera_axes(self.pose.position_m - self.pose.look_at_m))

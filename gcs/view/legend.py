@@ -9,7 +9,6 @@ from missions.mission import Mission
 
 VEHICLE: Rgb = (77, 184, 255)
 AHEAD: Rgb = (190, 224, 255)
-SEEN: Rgb = (255, 214, 120)
 
 Entry = tuple[str, Rgb, str]
 """CSS class of the sample, its colour, and what it means."""
@@ -32,7 +31,6 @@ def _entries(mission: Mission | None, theme: Theme, simulated: bool) -> Iterator
     yield "thin", VEHICLE, "planned by the cloud"
     yield "dot", VEHICLE, "track point"
     yield "diamond", VEHICLE, "target, in its vehicle's colour"
-    yield "dot", SEEN, "seen by a vehicle"
     yield "area", theme.bounds, "flight range"
     yield "dashed", theme.fence, "geofence"
     world = mission.world

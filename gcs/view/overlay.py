@@ -21,7 +21,9 @@ FEW = 14
 CHARACTER_PX, PADDING_PX, HEIGHT_PX = 6.9, 20.0, 20.0
 SMALL_HEIGHT_PX = 17.0
 EDGE_PX, MOST_ARROWS = 16.0, 24
-RINGS_OF_MANY = 1
+SETTLE, SETTLE_MANY = 3, 12
+"""Where tags stand is chosen anew once in so many times."""
+RINGS_OF_MANY = 0
 """In a large fleet a tag without room near its vehicle is left out."""
 CORNER_PX = (210.0, 128.0)
 """The upper right corner belongs to compass, scale bar and legend."""
@@ -60,6 +62,8 @@ class Overlay:
 
     def __init__(self) -> None:
         self._stood: dict[str, Array] = {}
+        self._settled: tuple[list[int], list[str]] = ([], [])
+        self._renders = 0
 
     def render(self, tags: Sequence[Tag], places_m: Array, lens: Lens) -> str:
         """The HTML for tags of what is at (n, 3) places."""
@@ -73,19 +77,29 @@ class Overlay:
         shown = sorted(np.flatnonzero(seen).tolist(), key=lambda index: -tags[index].urgency)
         details = ["" if brief and not tags[index].urgency else tags[index].details for index in shown]
         sizes = np.array([_size_px(tags[i], text) for i, text in zip(shown, details, strict=True)]).reshape(-1, 2)
-        spans = np.array([tags[index].span_px for index in shown])
-        nowhere = np.full(2, np.nan)
-        before = np.array([self._stood.get(tags[index].key, nowhere) for index in shown]).reshape(-1, 2)
-        corner = (lens.width_px - CORNER_PX[0], 0.0, float(lens.width_px), CORNER_PX[1])
-        picture, rings = (lens.width_px, lens.height_px), RINGS_OF_MANY if brief else RINGS
-        offsets = place(pixels[shown], sizes, spans, picture, before, rings=rings, kept_free_px=[corner])
-        self._stood = {tags[index].key: offset for index, offset in zip(shown, offsets, strict=True)}
+        self._renders += 1
+        keys = [tags[index].key for index in shown]
+        if (shown, keys) != self._settled or self._renders % (SETTLE_MANY if brief else SETTLE) == 0:
+            self._settled = (shown, keys)
+            spans = np.array([tags[index].span_px for index in shown])
+            self._settle(keys, pixels[shown], sizes, spans, lens, rings=RINGS_OF_MANY if brief else RINGS)
+        offsets = [self._stood[key] for key in keys]
         told = [
             _tag(tags[index], text, pixels[index], offset, size)
             for index, text, offset, size in zip(shown, details, offsets, sizes, strict=True)
         ]
         stems = "".join(stem for stem, _ in told)
         return f"<svg>{stems}</svg>" + "".join(label for _, label in told)
+
+    def _settle(
+        self, keys: Sequence[str], pixels: Array, sizes: Array, spans: Array, lens: Lens, *, rings: int
+    ) -> None:
+        """Choose anew where each tag stands; in between they go along with what they name."""
+        before = np.array([self._stood.get(key, np.full(2, np.nan)) for key in keys]).reshape(-1, 2)
+        corner = (lens.width_px - CORNER_PX[0], 0.0, float(lens.width_px), CORNER_PX[1])
+        picture = (lens.width_px, lens.height_px)
+        offsets = place(pixels, sizes, spans, picture, before, rings=rings, kept_free_px=[corner])
+        self._stood = dict(zip(keys, offsets, strict=True))
 
 
 def _tag(tag: Tag, details: str, anchor: Array, offset: Array, size: Array) -> tuple[str, str]:
@@ -129,7 +143,7 @@ def _arrows(tags: Sequence[Tag], places_m: Array, seen: npt.NDArray[np.bool_], l
         hidden, across / reach, down / reach, np.degrees(np.arctan2(down, across)), strict=True
     ):
         left, top = lens.width_px / 2 + x, lens.height_px / 2 + y
-        place = f"left:{left:.0f}px;top:{top:.0f}px;color:{css(tags[index].colour)};--turn:{angle:.0f}deg"
+        place = f"left:{left:.0f}px;top:{top:.0f}px;color:{css(tags[index].colour)};--turn:{round(angle)}deg"
         marks.append(f'<i class="out" style="{place}" title="{escape(tags[index].name)}"></i>')
     return "".join(marks)
 

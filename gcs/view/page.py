@@ -13,6 +13,7 @@ from gcs.view.browser import Browser
 from gcs.view.browsers import Browsers
 from gcs.view.cameras import Cameras
 from gcs.view.colours import BRAND, TARGET, Tone
+from gcs.view.editing_panel import EditingPanel
 from gcs.view.motion_scene import MotionScene
 from gcs.view.overlay import Tag
 from gcs.view.panels import Panels, Press
@@ -20,17 +21,20 @@ from gcs.view.plan_scene import PlanScene
 from gcs.view.replay_panel import ReplayPanel
 from gcs.view.sightings import Sighting, sightings, vehicle_colours, vehicle_order
 from gcs.view.theme import DARK, LIGHT, Theme
-from gcs.view.vehicle_scene import least_span_px
-from gcs.view.world_scene import WorldScene, diagonal_m
+from gcs.view.vehicle_scene import MANY, least_span_px
+from gcs.view.world_scene import OnPick, WorldScene, diagonal_m
+from missions.mission import Mission
 
 Array = npt.NDArray[np.float64]
 
 TITLE = "End-cloud GCS"
-TELL_INTERVAL_S = 0.25
-"""Panels and signs change this often; what moves is updated at every call."""
+TELL_INTERVAL_S, TELL_OF_MANY_S = 0.25, 0.5
+"""Panels and signs change this often, those of large fleets less; what moves is updated at every call."""
 
 WATCHED_M = np.array([[-30.0, -30.0, 0.0], [30.0, 30.0, 15.0]])
 """What is framed where there is no mission, around where the first vehicle has its home."""
+AROUND_M = np.array([10.0, 10.0, 3.0])
+"""How much around the vehicles of a fleet without a mission is framed."""
 TARGET_PX = 14.0
 VEHICLE_FLATNESS = 0.6
 """A quadrotor is less high than wide in a picture from above."""
@@ -63,6 +67,8 @@ class Page:
         self._motion = MotionScene(server.scene, max(LEAST_TRAIL_SPACING_M, size_m * TRAIL_SPACING_SHARE))
         self._panels = Panels(server, desk, self._press, self._views())
         self._replay = ReplayPanel(server.gui, desk.player) if desk.player is not None else None
+        if self._world is not None and desk.mission is not None and desk.player is None:
+            self._editing = EditingPanel(server, desk.mission, self._show_draft)
         self._browsers = Browsers(server, self._greet)
         self._use(DARK)
 
@@ -71,12 +77,15 @@ class Page:
         if self._replay is not None:
             self._replay.update()
         shown_s = self._desk.station.now_s
+        fleet_before = len(self._seen)
         self._seen = sightings(self._desk)
+        if len(self._seen) > fleet_before:
+            self._frame_fleet()
         with self._server.atomic():
             self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
-                self._next_tell_s = now_s + TELL_INTERVAL_S
+                self._next_tell_s = now_s + (TELL_OF_MANY_S if len(self._seen) > MANY else TELL_INTERVAL_S)
                 self._desk.collect_texts()
                 self._show_plan()
                 self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
@@ -101,6 +110,12 @@ class Page:
             _draw_plain(self._server.scene, theme)
         self._motion.use(theme)
         self._browsers.use(theme)
+
+    def _show_draft(self, mission: Mission, on_pick: OnPick | None) -> None:
+        """Draw a mission that is being edited, or the one that was loaded again."""
+        assert self._world is not None
+        self._world.show(mission, on_pick)
+        self._targets_m = [np.array(target.position_m) for target in mission.targets]
 
     def _pick(self, sysid: int, joins: bool) -> None:
         """A vehicle was clicked; called in a thread of viser."""
@@ -145,8 +160,8 @@ class Page:
 
     def _views(self) -> dict[str, tuple[viser.IconName, Press]]:
         return {
-            "Overview": (viser.Icon.CUBE, self._view(self._cameras.overview)),
-            "Top": (viser.Icon.MAP_2, self._view(self._cameras.from_above)),
+            "Overview": (viser.Icon.CUBE, self._view(self._overview)),
+            "Top": (viser.Icon.MAP_2, self._view(self._from_above)),
             "Follow": (viser.Icon.FOCUS_2, self._view(self._follow)),
             "Light": (viser.Icon.SUN, self._view(lambda _: self._use(LIGHT))),
             "Dark": (viser.Icon.MOON, self._view(lambda _: self._use(DARK))),
@@ -159,6 +174,20 @@ class Page:
                 self._loop.call_soon_threadsafe(act, client)
 
         return press
+
+    def _overview(self, client: viser.ClientHandle) -> None:
+        self._frame_fleet()
+        self._cameras.overview(client)
+
+    def _from_above(self, client: viser.ClientHandle) -> None:
+        self._frame_fleet()
+        self._cameras.from_above(client)
+
+    def _frame_fleet(self) -> None:
+        """Without a mission, what is framed is where the vehicles are."""
+        if self._world is None and self._seen:
+            places_m = np.array([sighting.position_m for sighting in self._seen])
+            self._cameras.frame(places_m.min(axis=0) - AROUND_M, places_m.max(axis=0) + AROUND_M)
 
     def _follow(self, client: viser.ClientHandle) -> None:
         """Follow the selected vehicle, or the first one."""

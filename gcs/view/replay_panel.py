@@ -59,6 +59,15 @@ class ReplayPanel:
         self._line.on_update(self._moved)
         self._speed.on_click(self._speed_chosen)
 
+    @property
+    def position_shown_s(self) -> float:
+        """Where the timeline stands."""
+        return float(self._line.value)
+
+    def want(self, position_s: float) -> None:
+        """Jump to a moment at the next update: whoever drags the timeline asks for many."""
+        self._wanted_s = position_s
+
     def update(self) -> None:
         """Do what was asked for since the last call, and show where the recording is."""
         if self._wanted_s is not None:
@@ -87,14 +96,11 @@ class ReplayPanel:
             self._player.play()
 
     def _jump(self, by_s: float) -> None:
-        self._wanted_s = self._player.position_s + by_s
+        self.want(self._player.position_s + by_s)
 
     def _moved(self, event: viser.GuiEvent) -> None:
         if event.client is not None:  # not by `update`
-            self._on_loop(lambda: self._want(self._line.value))
-
-    def _want(self, position_s: float) -> None:
-        self._wanted_s = position_s
+            self._on_loop(lambda: self.want(self._line.value))
 
     def _speed_chosen(self, event: viser.GuiEvent) -> None:
         chosen = float(str(event.target.value).removesuffix("×"))

@@ -1,6 +1,6 @@
 """The world as it is drawn: ground, flight range, obstacles, threats, pads and targets. It does not move."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +11,14 @@ from gcs.view.colours import Rgb
 from gcs.view.ground_scene import GroundScene, grid_spacing_m
 from gcs.view.ground_text import written
 from gcs.view.theme import DARK, Theme
-from missions import obstacles
+from missions import editing, obstacles
+from missions.editing import Part
 from missions.mission import Mission
 from missions.world import Bounds, Box, Cylinder, World
 
 Array = npt.NDArray[np.float64]
+OnPick = Callable[[Part], None]
+"""Told which part was clicked, in a thread of viser."""
 
 MARKER_SHARE = 0.014
 """A target's size, of the diagonal of the flight range."""
@@ -40,7 +43,9 @@ class WorldScene:
 
     def __init__(self, server: viser.ViserServer, mission: Mission, *, simulated: bool, theme: Theme = DARK) -> None:
         self._scene = server.scene
-        self._mission, self._world = mission, mission.world if simulated else mission.world.as_known()
+        self._simulated, self._on_pick = simulated, None
+        self._drawn: set[str] = set()
+        self._set(mission)
         peaks = obstacles.pack(World(bounds=mission.world.bounds, peaks=self._world.peaks))
         self._ground = GroundScene(server.scene, mission.world.bounds, peaks)
         self._size_m = diagonal_m(mission.world.bounds)
@@ -52,6 +57,20 @@ class WorldScene:
         """Draw everything, in place of what was drawn before."""
         self._theme = theme
         self._ground.draw(theme)
+        self._draw_things()
+
+    def show(self, mission: Mission, on_pick: OnPick | None = None) -> None:
+        """Draw another mission in the same flight range and terrain; `on_pick` makes its parts clickable."""
+        self._set(mission)
+        self._on_pick = on_pick
+        self._draw_things()
+
+    def _set(self, mission: Mission) -> None:
+        self._mission, self._world = mission, mission.world if self._simulated else mission.world.as_known()
+
+    def _draw_things(self) -> None:
+        """Draw all but the ground, and take away what was drawn before and is no more."""
+        before, self._drawn = self._drawn, set()
         self._draw_bounds(self._mission.world.bounds)
         self._draw_fence(self._mission.world.bounds)
         self._draw_obstacles()
@@ -59,6 +78,8 @@ class WorldScene:
         self._draw_movers()
         self._draw_starts()
         self._draw_targets()
+        for name in sorted(before - self._drawn, reverse=True):  # a node goes before the one that it hangs on
+            self._scene.remove_by_name(name)
 
     def ground_height_m(self, places_m: Array) -> Array:
         """(n,) height of the ground [m] at (n, 2 or 3) places."""
@@ -103,12 +124,12 @@ class WorldScene:
 
     def _draw_solid(self, thing: Box | Cylinder, mesh: shapes.Mesh, edges: Array) -> None:
         if thing.known:
-            self._mesh(f"/world/{thing.name}", mesh, self._theme.obstacle, opacity=0.85)
+            self._mesh(f"/world/{thing.name}", mesh, self._theme.obstacle, 0.85, _part(thing))
             self._lines(f"/world/{thing.name}/edges", edges, self._theme.obstacle_edge, 1.5)
             self._write_before(thing.name, mesh, self._theme.obstacle_edge)
         else:
             spacing_m = grid_spacing_m(float(np.ptp(mesh.vertices, axis=0).max()) * 2)
-            self._mesh(f"/world/{thing.name}", mesh, colours.UNMAPPED, opacity=0.25)
+            self._mesh(f"/world/{thing.name}", mesh, colours.UNMAPPED, 0.25, _part(thing))
             self._lines(f"/world/{thing.name}/edges", edges, colours.UNMAPPED, 2.0)
             self._lines(f"/world/{thing.name}/hatching", shapes.hatching(thing, spacing_m), colours.UNMAPPED, 1.0)
             self._write_before(f"{thing.name} (unmapped)", mesh, colours.UNMAPPED)
@@ -119,7 +140,7 @@ class WorldScene:
             place = np.array([*threat.centre_m, 0.0])
             dome = shapes.Mesh(dome.vertices + place, dome.faces)
             colour = colours.THREAT if threat.known else colours.UNMAPPED
-            self._mesh(f"/world/{threat.name}", dome, colour, opacity=0.2)
+            self._mesh(f"/world/{threat.name}", dome, colour, 0.2, Part(editing.Kind.THREAT, threat.name))
             rims = [self._parallel(threat.centre_m, threat.radius_m, angle) for angle in np.deg2rad([0.0, 30.0, 60.0])]
             self._lines(f"/world/{threat.name}/rims", np.concatenate(rims), colour, 1.5)
             self._write_before(threat.name, dome, colour)
@@ -152,7 +173,7 @@ class WorldScene:
         own = [colours.vivid(self._target_colours.get(target.name, colours.TARGET)) for target in targets]
         places_m = np.array([target.position_m for target in targets])
         mesh = shapes.diamond(self._size_m * MARKER_SHARE)
-        self._scene.add_batched_meshes_simple(
+        diamonds = self._scene.add_batched_meshes_simple(
             "/world/targets",
             mesh.vertices,
             mesh.faces,
@@ -162,6 +183,10 @@ class WorldScene:
             flat_shading=True,
             lod="off",
         )
+        on_pick = self._on_pick
+        if on_pick is not None:
+            picks = [Part(editing.Kind.TARGET, target.name) for target in targets]
+            diamonds.on_click(lambda event: on_pick(picks[event.instance_index or 0]))
         feet = self._on_ground(places_m[:, :2])
         stems = [np.stack((foot, place))[None] for foot, place in zip(feet, places_m, strict=True)]
         feet_m = self._size_m * MARKER_SHARE * 0.6
@@ -187,14 +212,20 @@ class WorldScene:
         above_m = float(self.ground_height_m(place_m)) + 0.002 * self._size_m
         mesh = written(text, self._text_m, np.array([place_m[0], place_m[1], above_m]))
         name = f"/writing/{text}"
+        self._drawn.add(name)
         self._scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, side="double", cast_shadow=False)
 
-    def _mesh(self, name: str, mesh: shapes.Mesh, colour: Rgb, opacity: float) -> None:
-        self._scene.add_mesh_simple(
+    def _mesh(self, name: str, mesh: shapes.Mesh, colour: Rgb, opacity: float, part: Part | None = None) -> None:
+        self._drawn.add(name)
+        handle = self._scene.add_mesh_simple(
             name, mesh.vertices, mesh.faces, color=colour, opacity=opacity, flat_shading=len(mesh.faces) < 100
         )
+        on_pick = self._on_pick
+        if on_pick is not None and part is not None:
+            handle.on_click(lambda _: on_pick(part))
 
     def _lines(self, name: str, segments: Array, colour: Rgb, width_px: float) -> None:
+        self._drawn.add(name)
         self._scene.add_line_segments(name, segments, colour, thickness=width_px, thickness_units="screen")
 
     def _coloured_lines(self, name: str, lines: Sequence[Array], own: Sequence[Rgb], width_px: float) -> None:
@@ -203,6 +234,10 @@ class WorldScene:
             [np.tile(np.array(colour, np.uint8), (len(part), 2, 1)) for part, colour in zip(lines, own, strict=True)]
         )
         self._scene.add_line_segments(name, segments, tints, thickness=width_px, thickness_units="screen")
+
+
+def _part(thing: Box | Cylinder) -> Part:
+    return Part(editing.Kind.BOX if isinstance(thing, Box) else editing.Kind.CYLINDER, thing.name)
 
 
 def colours_of(indices: Sequence[int]) -> list[Rgb]:

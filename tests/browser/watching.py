@@ -39,6 +39,12 @@ async def scene(page: Page) -> set[str]:
     return set(await page.evaluate("Object.keys(window.__viserSceneTree.getState())"))
 
 
+async def shows(page: Page, node: str, *, there: bool = True) -> None:
+    """Wait until a node is in the browser's scene, or is no more."""
+    found = f"{node!r} in window.__viserSceneTree.getState()"
+    await page.wait_for_function(found if there else f"!({found})")
+
+
 async def camera_position_m(page: Page) -> np.ndarray:
     """Of the browser's camera, in ENU."""
     w, x, y, z = await page.evaluate("window.__viserSceneTree.getState()[''].wxyz")

@@ -152,3 +152,9 @@ def test_a_first_key_is_pending_until_the_vehicle_signs_and_in_force_from_then_o
     assert believed(receiver, frame(KEY)) == 1
     assert receiver.signing.trust(1) is Trust.SIGNED
     assert believed(receiver, frame(None)) == 0
+
+
+def test_what_may_overtake_is_a_stream_of_its_own():
+    sender = codec()
+    bulk, control = sender.pack(heartbeat(), 1, link_id=1), sender.pack(heartbeat(), 1, link_id=0)
+    assert (bulk[-13], control[-13]) == (1, 0)

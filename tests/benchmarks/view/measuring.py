@@ -1,0 +1,123 @@
+"""The measurements: a page that is kept up to date at 10 Hz, and who looks at it."""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+from playwright.async_api import async_playwright
+
+from gcs.view.page import Page
+from gcs.view.server import UPDATE_INTERVAL_S, close_server, open_server
+from tests.benchmarks.view.circling_fleet import CirclingFleet
+from tests.browser.chromium import ARGUMENTS, find_chromium
+from tests.browser.loopback import HOST, free_port
+from tests.browser.raw_client import RawClient, raw_client
+
+Array = npt.NDArray[np.float64]
+
+WARM_UP_S = 4.0
+SLOW_BYTES_PER_S = 30e3
+
+
+@dataclass
+class Kept:
+    """A page that is kept up to date, and what that costs."""
+
+    port: int
+    cpu_ms: list[float] = field(default_factory=list)
+    """CPU time of each update in its thread [ms] ..."""
+    late_ms: list[float] = field(default_factory=list)
+    """... and how much later it began than it should have: what the page leaves to a flight in the same process."""
+
+    def forget(self) -> None:
+        self.cpu_ms.clear()
+        self.late_ms.clear()
+
+
+@dataclass(frozen=True)
+class Load:
+    """What one measurement has found; times per update, rates per client."""
+
+    cpu_ms: Array
+    late_ms: Array
+    fast_bytes_per_s: float
+    slow_bytes_per_s: float
+
+
+@asynccontextmanager
+async def kept_page(fleet: CirclingFleet) -> AsyncIterator[Kept]:
+    """A page whose vehicles fly on at real time."""
+    kept = Kept(free_port())
+    server = open_server(HOST, kept.port)
+    page = Page(server, fleet.desk)
+    keeping = asyncio.create_task(_keep(page, fleet, kept))
+    try:
+        yield kept
+        assert not keeping.done(), "the page has ended by itself"
+    finally:
+        keeping.cancel()
+        await asyncio.gather(keeping, return_exceptions=True)
+        await asyncio.to_thread(close_server, server)
+
+
+async def load(count: int, seconds: float, *, fast: int, slow: int) -> Load:
+    """Keep a page of so many vehicles up to date for so long, watched by fast and slow connections."""
+    async with AsyncExitStack() as stack:
+        kept = await stack.enter_async_context(kept_page(CirclingFleet(count)))
+        readers = [await stack.enter_async_context(raw_client(kept.port)) for _ in range(fast)]
+        laggards = [await stack.enter_async_context(raw_client(kept.port, SLOW_BYTES_PER_S)) for _ in range(slow)]
+        await asyncio.sleep(WARM_UP_S)
+        kept.forget()
+        before = [client.received for client in (*readers, *laggards)]
+        begun_s = time.perf_counter()
+        await asyncio.sleep(seconds)
+        lasted_s = time.perf_counter() - begun_s
+        rates = [_rate(client, was, lasted_s) for client, was in zip((*readers, *laggards), before, strict=True)]
+        return Load(
+            np.array(kept.cpu_ms),
+            np.array(kept.late_ms),
+            max(rates[:fast], default=0.0),
+            max(rates[fast:], default=0.0),
+        )
+
+
+async def reloads_s(count: int, flown_s: float, times: int) -> list[float]:
+    """From opening a tab to panels, tags and vehicles in it [s], in a flight that has lasted `flown_s` already."""
+    fleet, found = CirclingFleet(count), []
+    fleet.have_flown(flown_s, 0.2)
+    async with kept_page(fleet) as kept, async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=find_chromium(), args=ARGUMENTS)
+        try:
+            for _ in range(times + 1):
+                tab = await browser.new_page(viewport={"width": 1000, "height": 640})
+                begun_s = time.perf_counter()
+                await tab.goto(f"http://{HOST}:{kept.port}")
+                await tab.wait_for_selector(".gcs-fleet tr", state="attached", timeout=60_000)
+                await tab.wait_for_function("'/fleet/hull' in (window.__viserSceneTree?.getState() ?? {})")
+                found.append(time.perf_counter() - begun_s)
+                await tab.close()
+        finally:
+            await browser.close()
+    return found[1:]  # the first one starts the browser's own processes
+
+
+def _rate(client: RawClient, before: int, lasted_s: float) -> float:
+    return (client.received - before) / lasted_s
+
+
+async def _keep(page: Page, fleet: CirclingFleet, kept: Kept) -> None:
+    clock = asyncio.get_running_loop().time
+    due_s = clock()
+    while True:
+        kept.late_ms.append((clock() - due_s) * 1e3)
+        fleet.fly_on(UPDATE_INTERVAL_S)
+        fleet.sample()
+        begun_s = time.thread_time()
+        page.update(clock())
+        kept.cpu_ms.append((time.thread_time() - begun_s) * 1e3)
+        due_s = max(due_s + UPDATE_INTERVAL_S, clock())
+        await asyncio.sleep(due_s - clock())
