@@ -63,8 +63,10 @@ bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, 
 
 experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10
 	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS)
-bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, fleets: make bench-onboard SEEDS=0:10
-	$(BIN)/python -m tests.benchmarks.onboard.fleet_rows --seeds $(SEEDS)
+
+bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, alone (50 seeds are asked for) and in fleets: make bench-onboard SEEDS=0:10 [BENCH=--quick]
+	@alone=0; $(BIN)/python -m tests.benchmarks.onboard --seeds $(SEEDS) $(BENCH) || alone=1; \
+	$(BIN)/python -m tests.benchmarks.onboard.fleet_rows --seeds $(SEEDS) && exit $$alone
 
 bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK and MAVProxy, and a fleet of a hundred: make bench-link SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.link --seeds $(SEEDS) $(BENCH)

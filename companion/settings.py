@@ -41,9 +41,9 @@ class SearchSettings:
 
     control_points: int = 12
     """Of one local trajectory: three hold the start, three the end at rest, the others are free."""
-    particles: int = 50
-    iterations: int = 15
-    stall_generations: int = 4
+    particles: int = 30
+    iterations: int = 8
+    stall_generations: int = 3
     """A search ends early when so many generations have found nothing better."""
     archive_size: int = 24
     patience_generations: int = 3

@@ -93,7 +93,7 @@ class LocalMap:
         grid = self._grid
         integrate(grid, scan.sensor_enu_m, np.ascontiguousarray(candidates[~moving]), rays)
         for place_m, radius_m in self._watch.vacated():
-            vacate(grid, place_m, radius_m)
+            self.forget(place_m, radius_m)
         self._next_block = rebuild(grid, self._next_block, REBUILT_PER_SCAN)
         field = Field(grid.field.copy(), grid.low_m, VOXELS_PER_NODE * grid.voxel_m, grid.step_m)
         self.view = View(field, self._watch.movers)
@@ -107,6 +107,10 @@ class LocalMap:
         voxels = np.argwhere(grid.strength >= CERTAIN)
         centres_m = grid.low_m + (voxels + 0.5) * grid.voxel_m
         return centres_m, grid.low_m, grid.low_m + self._size * grid.voxel_m
+
+    def forget(self, centre_m: Array, radius_m: float) -> None:
+        """Take everything in a ball, centre (3,) ENU, out of the map."""
+        vacate(self._grid, centre_m, radius_m)
 
     def _recentre(self, sensor_m: Array) -> None:
         """Move the window, in whole blocks, so that the vehicle is not near its edge."""

@@ -11,7 +11,7 @@ from companion.mapping.sorting import Known
 from companion.planner.braking import brake_along
 from companion.planner.dominance import objective_weights
 from companion.planner.evaluation import HARD
-from companion.planner.guide import Guide, lay_guide, lead_around
+from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around
 from companion.planner.limits import Surroundings, flight_limits, free_space, surroundings
 from companion.planner.local_plan import Horizon, LocalPlanner, plan_along, warm_way
 from companion.planner.mopso import search_plan
@@ -156,7 +156,8 @@ class Planner:
         )
         if guide is None or guide is request.guide:  # without a way around, as far as it goes
             return self._plan_along(request, request.guide, request.arc_m, around)
-        from_m = max(request.arc_m - self.horizon_m, 0.0) if guide.first_index == request.guide.first_index else 0.0
+        begun_anew = np.linalg.norm(guide.way.points_m[0] - place_m) < MERGED_M
+        from_m = 0.0 if begun_anew else max(request.arc_m - self.horizon_m, 0.0)
         arc_m = guide.project(place_m, from_m, 2.0 * self.horizon_m)
         return self._plan_along(request, guide, arc_m, around)
 

@@ -196,7 +196,7 @@ class EditingPanel:
     def _download(self, event: viser.GuiEvent) -> None:
         mission = self.draft
         if event.client is not None:
-            event.client.send_file_download(f"{mission.name}.yaml", to_yaml(mission).encode())
+            event.client.send_file_download(f"{mission.name}.yaml", to_yaml(mission).encode(), save_immediately=True)
 
     def _tell(self, problem: str) -> None:
         changed = "changed, not flown by anybody" if self.draft != self._loaded else "as it was loaded"

@@ -96,7 +96,7 @@ async def reloads_s(count: int, flown_s: float, times: int) -> list[float]:
                 tab = await browser.new_page(viewport={"width": 1000, "height": 640})
                 begun_s = time.perf_counter()
                 await tab.goto(f"http://{HOST}:{kept.port}")
-                await tab.wait_for_selector(".gcs-fleet tr", timeout=60_000)
+                await tab.wait_for_selector(".gcs-fleet tr", state="attached", timeout=60_000)
                 await tab.wait_for_function("'/fleet/hull' in (window.__viserSceneTree?.getState() ?? {})")
                 found.append(time.perf_counter() - begun_s)
                 await tab.close()
