@@ -22,6 +22,11 @@ COMPONENT_INFORMATION = Layout.of_own("COMPONENT_INFORMATION", 395, 0, struct.St
 COMPONENT_METADATA = Layout.of_own("COMPONENT_METADATA", 397, 182, struct.Struct("<II100s"))
 
 
+def int16(value: float) -> int:
+    """As the message's field can hold it: an impact is felt as more than 32 g."""
+    return min(max(round(value), -(2**15)), 2**15 - 1)
+
+
 def distance_sensor(m: Moment) -> tuple:
     """As PX4's simulation in hardware has it: looking down, on ground that is as high as home."""
     height_cm = min(max(round(m.s.height_m * 100.0), 0), RANGE_CM)
@@ -45,8 +50,8 @@ def distance_sensor(m: Moment) -> tuple:
 def scaled_imu(m: Moment) -> tuple:
     """The accelerometer and gyroscope in thousandths; there is no magnetometer."""
     s = m.s
-    felt = (round(force * MILLI_G) for force in (s.force_x_m_s2, s.force_y_m_s2, s.force_z_m_s2))
-    rates = (round(rate * 1e3) for rate in (s.p_rad_s, s.q_rad_s, s.r_rad_s))
+    felt = (int16(force * MILLI_G) for force in (s.force_x_m_s2, s.force_y_m_s2, s.force_z_m_s2))
+    rates = (int16(rate * 1e3) for rate in (s.p_rad_s, s.q_rad_s, s.r_rad_s))
     return m.time_boot_ms, *felt, *rates, 0, 0, 0, 0
 
 
@@ -72,8 +77,8 @@ def hil_state_quaternion(m: Moment) -> tuple:
     x, y, z = (float(here - error) for here, error in zip((s.x_m, s.y_m, s.z_m), body["position_error_m"], strict=True))
     place = m.autopilot.craft.frame.on_earth(LocalPoint(x, y, z))
     attitude, rates = tuple(body["attitude"].tolist()), body["rates_rad_s"].tolist()
-    velocity = (round(speed * 100.0) for speed in body["velocity_m_s"].tolist())
-    felt = (round(force * MILLI_G) for force in body["specific_force_m_s2"].tolist())
+    velocity = (int16(speed * 100.0) for speed in body["velocity_m_s"].tolist())
+    felt = (int16(force * MILLI_G) for force in body["specific_force_m_s2"].tolist())
     here = e7(place.latitude_deg), e7(place.longitude_deg), round(place.altitude_m * 1e3)
     return m.time_us, attitude, *rates, *here, *velocity, 0, 0, *felt
 

@@ -38,6 +38,8 @@ def items_of(points_m: np.ndarray = TRACK_M, speed_m_s: float = 3.0) -> tuple[Mi
 class StraightPlanner:
     """Plans straight lines of two seconds towards the next track point; finds nothing when it is told so."""
 
+    voxel_m = 0.1
+
     def __init__(self) -> None:
         self.limits = flight_limits(INDOOR, Reserve())
         self.clear = True
