@@ -34,7 +34,7 @@ class Engagement:
         self.failure = Reason.NONE
         self._crew = crew
         self._index = order.track.index_of(current_seq)
-        self._since_s = now_s
+        self._since_s = self._ask_at_s = now_s
         self._asked: PlanRequest | None = None
 
     def tick(self, odometry: Odometry, now_s: float) -> Iterator[Instruction]:
@@ -44,22 +44,26 @@ class Engagement:
             yield self._standing(self.plan, odometry)
             if waited_s > settings.offboard_timeout_s:
                 self.failure = Reason.OFFBOARD_REFUSED
-        elif self._asked is None and np.linalg.norm(odometry.velocity_m_s) < settings.standing_m_s:
-            self._asked = self._request(odometry, now_s)
-            yield instructions.RequestPlan(self._asked)
         elif waited_s > settings.standing_timeout_s:
             self.failure = Reason.NO_PATH
+        elif self._wants_plan(odometry, now_s):
+            self._asked = self._request(odometry, now_s)
+            yield instructions.RequestPlan(self._asked)
 
     def take(self, plan: Plan, odometry: Odometry, now_s: float) -> Iterator[Instruction]:
         """With a path found, enter OFFBOARD; the stream has to be there first."""
         if self.plan is not None or plan.request is not self._asked:
             return
-        if plan.trajectory is None:
-            self.failure = Reason.NO_PATH
+        if plan.trajectory is None:  # what is in the way may be another vehicle that is about to go on
+            self._asked, self._ask_at_s = None, now_s + self._crew.settings.retry_s
             return
         self.plan, self._since_s = plan, now_s
         yield self._standing(plan, odometry)
         yield instructions.CommandMode(FlightMode.OFFBOARD)
+
+    def _wants_plan(self, odometry: Odometry, now_s: float) -> bool:
+        stands = bool(np.linalg.norm(odometry.velocity_m_s) < self._crew.settings.standing_m_s)
+        return self._asked is None and now_s >= self._ask_at_s and stands
 
     def _request(self, odometry: Odometry, now_s: float) -> PlanRequest:
         """From the hovering position along what remains of the track."""

@@ -10,7 +10,7 @@ from enum import Enum, auto
 
 from missions.mission_items import MissionItem
 from sitl.autopilot.craft import Craft, distance_m, is_there
-from sitl.autopilot.places import LocalPoint
+from sitl.autopilot.places import HIGHEST_M, LocalPoint
 from sitl.autopilot.plan import (
     PLACES,
     TAKEOFF_AND_LANDING,
@@ -165,7 +165,7 @@ class MissionFlight:
                 craft.look_at(self._place(item, s) if has_place(item) else None)
             case Cmd.DO_SET_ROI_NONE:
                 craft.look_at(None)
-            case Cmd.DO_SET_HOME:
+            case Cmd.DO_SET_HOME if abs(item.z) <= HIGHEST_M:
                 place = self._place(item, s)
                 craft.set_home(LocalPoint(place.x_m, place.y_m, place.z_m), craft.home_yaw_rad, craft.home_set_s)
 

@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 from sitl.geodesy import project, reproject
 
+HIGHEST_M = 1e5
+"""No home lies higher or deeper than this [m]: it has to fit into messages."""
+
 
 class LocalPoint(NamedTuple):
     """A point in the autopilot's NED frame [m]."""

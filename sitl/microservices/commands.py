@@ -5,7 +5,7 @@ from typing import Any
 
 from sitl.autopilot.modes import Mode, mode_of, mode_of_flags
 from sitl.autopilot.orbit import OrbitOrder
-from sitl.autopilot.places import LocalPoint, is_place
+from sitl.autopilot.places import HIGHEST_M, LocalPoint, is_place
 from sitl.autopilot.reports import Result, Severity
 from sitl.dialect import mavlink
 from sitl.microservices.command_server import Command, CommandServer, Handler
@@ -124,7 +124,7 @@ def _set_home(server: CommandServer, command: Command, sender: Sender) -> Result
         autopilot.set_home()
         return Result.ACCEPTED
     latitude_deg, longitude_deg = command.place
-    if not is_place(latitude_deg, longitude_deg) or not math.isfinite(command.params[6]):
+    if not is_place(latitude_deg, longitude_deg) or not abs(command.params[6]) <= HIGHEST_M:  # nor is NaN
         return Result.DENIED
     autopilot.set_home(autopilot.craft.frame.local(latitude_deg, longitude_deg, command.params[6]))
     return Result.ACCEPTED

@@ -79,7 +79,7 @@ def test_a_stream_of_new_frames_is_not_kept(times_us: list[int], repeats: int):
 
 numbers = st.integers(-(2**40), 2**40)
 json_values = st.one_of(
-    st.none(), st.booleans(), numbers, st.floats(), st.text(max_size=5), st.lists(numbers, max_size=80)
+    st.none(), st.booleans(), numbers, st.floats(), st.text("a0 -.\x00é", max_size=5), st.lists(numbers, max_size=80)
 )
 NAMES = ("time_usec", "distances", "max_distance", "increment", "increment_f", "angle_offset", "frame")
 
