@@ -319,22 +319,34 @@ class FlightApp:
         while True:
             await asyncio.sleep(REPORT_INTERVAL_S)
             if self.flight.finished and self.report is None:
-                self.report = await asyncio.to_thread(self._write_report, "")
+                flown = self._flown()
+                self.report = self._judge(flown, "")
+                await asyncio.to_thread(self._draw, flown)  # takes a second, in which the page goes on
                 self.events.add("ended", f"{'success' if self.report.success else 'failed'}: {self.report.reason}")
 
     def _write_report(self, reason: str) -> FlightReport:
         """Write `report.json` and `flight.png`."""
-        flown, folder = self._flown(), self.programs.log_dir
+        flown = self._flown()
+        report = self._judge(flown, reason)
+        self._draw(flown)
+        return report
+
+    def _judge(self, flown: dict[int, Flown], reason: str) -> FlightReport:
+        """Write `report.json`."""
         ends_s = [float(part.times_s[-1]) for part in flown.values() if len(part.times_s)]
         wall_s = time.monotonic() - self._started_s
         report = make_report(self.flight, flown, reason=reason, wall_s=wall_s, sim_s=max(ends_s, default=0.0))
-        (folder / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
-        names = {vehicle.sysid: vehicle.name for vehicle in self.flight.mission.vehicles}
-        tracks = {names[sysid]: part.in_flight().positions_m for sysid, part in flown.items() if sysid in names}
-        draw_flight(folder / "flight.png", self.flight.mission, self.flight.plan, tracks)
+        written = msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n"
+        (self.programs.log_dir / "report.json").write_bytes(written)
         self._journal.look(self.flight, self.station.unix_us())
         self._journal.end(report.success, self.station.unix_us())
         return report
+
+    def _draw(self, flown: dict[int, Flown]) -> None:
+        """Write `flight.png`; it knows no event loop, so that a thread may do it."""
+        names = {vehicle.sysid: vehicle.name for vehicle in self.flight.mission.vehicles}
+        tracks = {names[sysid]: part.in_flight().positions_m for sysid, part in flown.items() if sysid in names}
+        draw_flight(self.programs.log_dir / "flight.png", self.flight.mission, self.flight.plan, tracks)
 
     def _flown(self) -> dict[int, Flown]:
         truth = self.programs.truth_path

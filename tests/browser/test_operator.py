@@ -181,7 +181,7 @@ async def test_vehicles_are_sent_to_where_the_operator_clicks(open_page: OpenPag
     await press(page, "Go to")
     await page.wait_for_timeout(500)
     await page.mouse.click(640, 560)  # on the floor before the crate
-    await until(lambda: scripted.desk.orders.orders[-1].intent.value == "Go to", "the order is there")
+    await until(lambda: len(scripted.desk.orders.orders) > 0, "the order is there")
     order = scripted.desk.orders.orders[-1]
     await until(lambda: order.state.value != "pending", "it has been answered")
     assert (order.who, order.state.value) == ("alpha", "accepted"), order.reason
