@@ -170,9 +170,20 @@ def test_without_a_first_path_control_is_not_taken():
     rig = Rig().airborne()
     rig.planner.blind = True
     rig.start()
-    rig.run(1.0)
+    rig.run(PilotSettings().standing_timeout_s + 0.1)
     assert (rig.pilot.state, rig.pilot.reason) == (State.READY, Reason.NO_PATH)
     assert not acts(rig.sent)
+
+
+def test_a_path_that_is_free_a_little_later_is_flown():
+    rig = Rig().airborne()
+    rig.planner.blind = True
+    rig.start()
+    rig.run(2.0)
+    assert rig.pilot.state is State.ENGAGING
+    rig.planner.blind = False
+    rig.run(PilotSettings().retry_s + 0.1)
+    assert acts(rig.sent)
 
 
 def test_a_vehicle_that_is_in_offboard_already_is_flown_as_well():
