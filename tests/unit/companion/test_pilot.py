@@ -7,7 +7,7 @@ import pytest
 from companion import events, instructions
 from companion.events import FlightMode
 from companion.instructions import CommandResult
-from companion.settings import PlanningMode
+from companion.settings import PilotSettings, PlanningMode
 from companion.states import TRANSITIONS
 from missions.mission import OnArrival
 from missions.mission_items import Command, MissionItem, plan_id
