@@ -65,7 +65,7 @@ class Flight:
         self._retry_at_s = now_s
         self._replan_ms = 0.0
         self._announced_item = -1
-        self._conflict_s = np.inf  # when the committed trajectory meets something
+        self._conflict_s = self._danger_s = np.inf  # when the committed trajectory meets something, and hard
         self._asked_aside = self._asked_wanted = False
         self._left_track_at: int | None = None
         """The track point that was flown to when the vehicle began to make way for another one."""
@@ -112,7 +112,9 @@ class Flight:
         latest = self.course.latest
         self._traffic.look(latest, now_s, idle=self.course.reaches_end and self.is_at_rest(now_s))
         meets_s = self._traffic.conflict_s(latest, now_s)
-        self._conflict_s = min(self._crew.planner.conflict_s(latest, now_s), meets_s - BRAKES_EARLIER_S)
+        outlook = self._crew.planner.outlook(latest, now_s)
+        self._conflict_s = min(outlook.lacks_s, meets_s - BRAKES_EARLIER_S)
+        self._danger_s = min(outlook.dangerous_s, meets_s - BRAKES_EARLIER_S)
         trouble = self._trouble(now_s, odometry_age_s, sensor_silent)
         if trouble is not Reason.NONE and self.holding is Reason.NONE:
             yield from self.brake(trouble, now_s)
@@ -279,7 +281,7 @@ class Flight:
             return Reason.NO_POSITION
         if sensor_silent:
             return Reason.NO_SENSOR
-        if self._conflict_s - now_s < self._brakes_s(now_s):
+        if self._danger_s - now_s < self._brakes_s(now_s):
             return Reason.NO_PATH
         ended = self.is_at_rest(now_s) and not self.course.reaches_end
         waits = self._left_track_at is not None and not self._traffic.is_stuck(now_s)

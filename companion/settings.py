@@ -41,9 +41,9 @@ class SearchSettings:
 
     control_points: int = 12
     """Of one local trajectory: three hold the start, three the end at rest, the others are free."""
-    particles: int = 30
-    iterations: int = 8
-    stall_generations: int = 3
+    particles: int = 20
+    iterations: int = 5
+    stall_generations: int = 2
     """A search ends early when so many generations have found nothing better."""
     archive_size: int = 24
     patience_generations: int = 3
@@ -52,7 +52,7 @@ class SearchSettings:
     """Off: Pareto dominance alone."""
     adaptive_leader: bool = True
     """Off: the leader is a random entry of the archive."""
-    tabu_neighbours: int = 8
+    tabu_neighbours: int = 6
     """Size of the random neighbourhood subset; 0 switches the tabu search off."""
     tabu_length: int = 8
 

@@ -87,6 +87,9 @@ def fill_clearance(points_enu_m: Array, obstacles: Obstacles, out: Array) -> Non
     The arrays are taken out of `obstacles` once: doing so for every point would cost more than the distances.
     """
     boxes, cylinders, threats, peaks = obstacles.boxes, obstacles.cylinders, obstacles.threats, obstacles.peaks
+    if len(boxes) + len(cylinders) + len(threats) + len(peaks) == 0:
+        out[:] = FAR_M
+        return
     for i in range(len(points_enu_m)):
         east, north, up = points_enu_m[i, 0], points_enu_m[i, 1], points_enu_m[i, 2]
         out[i] = nearest_of(east, north, up, boxes, cylinders, threats, peaks)

@@ -80,12 +80,16 @@ def interpolated(x: float, y: float, z: float, values: Bytes, step_m: float) -> 
     if not (x >= 0.0 and y >= 0.0 and z >= 0.0):
         return FAR_M
     i, j, k = int(x), int(y), int(z)
-    if i + 1 >= values.shape[0] or j + 1 >= values.shape[1] or k + 1 >= values.shape[2]:
+    n_north, n_up = values.shape[1], values.shape[2]
+    if i + 1 >= values.shape[0] or j + 1 >= n_north or k + 1 >= n_up:
         return FAR_M
-    a, b = np.int64(values[i, j, k]), np.int64(values[i, j, k + 1])
-    c, d = np.int64(values[i, j + 1, k]), np.int64(values[i, j + 1, k + 1])
-    e, f = np.int64(values[i + 1, j, k]), np.int64(values[i + 1, j, k + 1])
-    g, h = np.int64(values[i + 1, j + 1, k]), np.int64(values[i + 1, j + 1, k + 1])
+    flat, near_row = values.reshape(-1), np.uint64((i * n_north + j) * n_up + k)
+    one, next_row, far_row = np.uint64(1), near_row + np.uint64(n_up), near_row + np.uint64(n_north * n_up)
+    last_row = far_row + np.uint64(n_up)
+    a, b = np.int64(flat[near_row]), np.int64(flat[near_row + one])
+    c, d = np.int64(flat[next_row]), np.int64(flat[next_row + one])
+    e, f = np.int64(flat[far_row]), np.int64(flat[far_row + one])
+    g, h = np.int64(flat[last_row]), np.int64(flat[last_row + one])
     if a + b + c + d + e + f + g + h == 8 * SATURATED:
         return FAR_M
     p, q, r = x - i, y - j, z - k

@@ -49,7 +49,9 @@ class LocalProblem(NamedTuple):
     free_m: Array
     """(K + 1,), filled: clearance."""
     lacking_m: Array
-    """(K + 1,), filled: what lacks of clearance, height and flight range."""
+    """(K + 1,), filled: what lacks of clearance, height and flight range ..."""
+    scarce_m: Array
+    """(K + 1,), filled: ... and what lacks of clearance and reserve."""
 
 
 @compiled
@@ -72,10 +74,11 @@ def evaluate(x: Array, problem: LocalProblem, value: Array) -> float:
     trace(control, knot_s, problem.rows, motion)
     step_s = knot_s * (len(control) - 3) / (len(motion) - 1)
     free_space(motion, step_s, problem.around, free_m)
-    lacking(motion, free_m, step_s, problem.around, problem.ends, limits, lacking_m)
+    lacking(motion, free_m, step_s, problem.around, problem.ends, limits, lacking_m, problem.scarce_m)
     value[HARD] = value[SOFT] = 0.0
     for k in range(1, len(motion)):
         value[HARD] += lacking_m[k] / limits.clearance_m
+        value[SOFT] += problem.scarce_m[k] / limits.clearance_m
     judge_motion(motion, free_m, knot_s * (len(control) - 3), problem.start, reference.samples, limits, value)
     judge_way(control, motion, free_m, knot_s, reference, limits, value)
     return knot_s

@@ -18,17 +18,29 @@ Array = npt.NDArray[np.float64]
 MAX_CELLS = 60_000
 CELL_MARGIN = 0.25
 """Cells need so much more clearance, as a share of their size: the way between two cells is clear as well."""
-PROBES_PER_CELL = 3.0
+FADED_CELLS = 6.0
+"""The margin fades out within so many cells of either end: who stands in a narrow place is not walled in by it."""
+PROBES_PER_CELL = 2.0
 """How densely a straight line is looked at."""
+BERTH_RESERVES, NEAR_SHARE = 4.0, 0.7
+"""With less clearance than that required and so many reserves, ways are counted as slower: this share of the speed."""
 BLOCKED = 0.0
 UNSEEN = -1.0
 """Speed of a cell that the search has not come to yet."""
-GREED = 1.15
+SQRT2, SQRT3 = float(np.sqrt(2.0)), float(np.sqrt(3.0))
+GREED = 1.3
 """The estimate of the rest of a way is taken by so much too seriously: far fewer cells, hardly longer ways."""
 
 
 def way_around(
-    start_m: Array, goal_m: Array, room_m: float, cell_m: float, limits: FlightLimits, around: Surroundings
+    start_m: Array,
+    goal_m: Array,
+    room_m: float,
+    cell_m: float,
+    limits: FlightLimits,
+    around: Surroundings,
+    *,
+    narrow: bool = False,
 ) -> Array:
     """The quickest way from one place to another.
 
@@ -39,17 +51,24 @@ def way_around(
         cell_m: least size of a cell; larger ones are taken where there would be too many.
         limits: clearance and speeds.
         around: what is in the way, and the flight range.
+        narrow: go where cells have no more clearance than what is required.
 
     Returns:
         (m, 3) corners from start to goal; (0, 3) when there is no way.
     """
     start_m, goal_m = np.asarray(start_m, dtype=float), np.asarray(goal_m, dtype=float)
-    return find_way(start_m, goal_m, room_m, cell_m, limits, around)
+    return find_way(start_m, goal_m, room_m, cell_m, 0.0 if narrow else CELL_MARGIN, limits, around)
 
 
 @compiled
 def find_way(
-    start_m: Array, goal_m: Array, room_m: float, cell_m: float, limits: FlightLimits, around: Surroundings
+    start_m: Array,
+    goal_m: Array,
+    room_m: float,
+    cell_m: float,
+    margin: float,
+    limits: FlightLimits,
+    around: Surroundings,
 ) -> Array:
     """`way_around`, compiled."""
     low = np.maximum(np.minimum(start_m, goal_m) - room_m, around.room_m[0])
@@ -64,7 +83,7 @@ def find_way(
         first[axis] = min(max(int(np.rint((start_m[axis] - low[axis]) / cell_m)), 0), shape[axis] - 1)
         last[axis] = min(max(int(np.rint((goal_m[axis] - low[axis]) / cell_m)), 0), shape[axis] - 1)
     ends = ends_of(start_m, goal_m, around, limits)
-    cells = astar(low, shape, cell_m, first, last, limits, around, ends)
+    cells = astar(low, shape, cell_m, margin * cell_m, first, last, limits, around, ends)
     if len(cells) == 0:
         return np.empty((0, 3))
     path = np.empty((max(len(cells), 2), 3))
@@ -81,6 +100,7 @@ def astar(
     low: Array,
     shape: npt.NDArray[np.int64],
     cell_m: float,
+    margin_m: float,
     first: npt.NDArray[np.int64],
     last: npt.NDArray[np.int64],
     limits: FlightLimits,
@@ -93,6 +113,7 @@ def astar(
         low: (3,) place of the first cell, ENU [m].
         shape: (3,) number of cells.
         cell_m: size of a cell.
+        margin_m: cells need so much more clearance, but for those around the first and the last one.
         first: (3,) where the way begins; it may be blocked itself.
         last: (3,) where it ends; likewise.
         limits, around, ends: see `lacking`.
@@ -101,13 +122,13 @@ def astar(
     begin, end = (first[0] * n_north + first[1]) * n_up + first[2], (last[0] * n_north + last[1]) * n_up + last[2]
     n = shape[0] * n_north * n_up
     speeds, cost, parents = np.full(n, UNSEEN), np.full(n, np.inf), np.full(n, -1, np.int64)
-    probe, climb_sine, fast_m_s = Probe(np.empty((1, 3)), np.empty(1), np.empty(1)), sine_of(limits), limits.cruise_m_s
+    probe, climb_sine, fast_m_s = new_probe(), sine_of(limits), limits.cruise_m_s
     cost[begin] = 0.0
     queue: list[tuple[float, int]] = [(0.0, int(begin))]
     while len(queue) > 0:
         estimate, cell = heapq.heappop(queue)
         east, north, up = cell // (n_north * n_up), cell // n_up % n_north, cell % n_up
-        ahead = GREED * span(last[0] - east, last[1] - north, last[2] - up) * cell_m / fast_m_s
+        ahead = GREED * steps_between(last[0] - east, last[1] - north, last[2] - up) * cell_m / fast_m_s
         if cell == end:
             break
         if estimate > cost[cell] + ahead + 1e-9:
@@ -121,16 +142,25 @@ def astar(
             if speeds[other] == UNSEEN:
                 probe.place_m[0, 0], probe.place_m[0, 1] = low[0] + cell_m * e, low[1] + cell_m * n_
                 probe.place_m[0, 2] = low[2] + cell_m * u
-                speeds[other] = speed_at(probe, CELL_MARGIN * cell_m, limits, around, ends)
+                off = min(span(e - first[0], n_ - first[1], u - first[2]), span(e - last[0], n_ - last[1], u - last[2]))
+                speeds[other] = speed_at(probe, margin_m * min(off / FADED_CELLS, 1.0), limits, around, ends)
             if speeds[other] == BLOCKED and other != end:
                 continue
             length_m = climbed(span(de, dn, du), du, climb_sine) * cell_m
-            reached = cost[cell] + length_m / max(speeds[other], limits.avoidance_m_s)
+            reached = cost[cell] + length_m / max(speeds[other], NEAR_SHARE * limits.avoidance_m_s)
             if reached < cost[other]:
                 cost[other], parents[other] = reached, cell
-                left = GREED * span(last[0] - e, last[1] - n_, last[2] - u) * cell_m / fast_m_s
+                left = GREED * steps_between(last[0] - e, last[1] - n_, last[2] - u) * cell_m / fast_m_s
                 heapq.heappush(queue, (float(reached + left), int(other)))
     return _trace(parents, begin, end)
+
+
+@compiled
+def steps_between(de: int, dn: int, du: int) -> float:
+    """Length, in cells, of the shortest way on an empty grid with 26 neighbours."""
+    a, b, c = abs(de), abs(dn), abs(du)
+    most, least = max(a, max(b, c)), min(a, min(b, c))
+    return most + (SQRT2 - 1.0) * (a + b + c - most - least) + (SQRT3 - SQRT2) * least
 
 
 class Probe(NamedTuple):
@@ -142,18 +172,30 @@ class Probe(NamedTuple):
     """(1,)."""
     lacking_m: Array
     """(1,)."""
+    scarce_m: Array
+    """(1,)."""
+
+
+@compiled
+def new_probe() -> Probe:
+    return Probe(np.empty((1, 3)), np.empty(1), np.empty(1), np.empty(1))
 
 
 @compiled
 def speed_at(probe: Probe, margin_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> float:
-    """The speed [m/s] that is allowed at the probe's place; BLOCKED where clearance (less a margin) or height lacks."""
+    """The speed [m/s] that is allowed at the probe's place; BLOCKED where clearance (less a margin) or height lacks.
+
+    Near obstacles it is less: from afar their edges are seen roughly, and ways that hug them are soon blocked again.
+    """
     free_space(probe.place_m, 0.0, around, probe.free_m)
     slow = probe.free_m[0] < limits.avoidance_distance_m
+    near = probe.free_m[0] < limits.clearance_m + BERTH_RESERVES * limits.reserve_m
     probe.free_m[0] -= margin_m
-    lacking(probe.place_m, probe.free_m, 0.0, around, ends, limits, probe.lacking_m)
+    lacking(probe.place_m, probe.free_m, 0.0, around, ends, limits, probe.lacking_m, probe.scarce_m)
     if probe.lacking_m[0] > 0.0:
         return BLOCKED
-    return limits.avoidance_m_s if slow else limits.cruise_m_s
+    speed_m_s = limits.avoidance_m_s if slow else limits.cruise_m_s
+    return speed_m_s * NEAR_SHARE if near else speed_m_s
 
 
 @compiled
@@ -179,20 +221,23 @@ def climbed(length_m: float, up_m: float, climb_sine: float) -> float:
 
 @compiled
 def straighten(path: Array, cell_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> Array:
-    """Leave out the corners of a (m, 3) path wherever the straight line is clear and no slower."""
-    probe, m = Probe(np.empty((1, 3)), np.empty(1), np.empty(1)), len(path)
+    """Leave out the corners of a (m, 3) path where the straight line is clear and no slower; the farthest by bisection."""
+    probe, m = new_probe(), len(path)
     times = np.zeros(m)
     for i in range(1, m):
         times[i] = times[i - 1] + flown_s(path[i - 1], path[i], cell_m, limits, around, ends, probe, np.inf)
     kept, count = np.zeros(m, np.int64), 1
     while kept[count - 1] < m - 1:
         i, j = kept[count - 1], m - 1
-        while j > i + 1:
+        reached, beyond = i + 1, m
+        while j > reached:
             most_s = times[j] - times[i] + 1e-9
             if flown_s(path[i], path[j], cell_m, limits, around, ends, probe, most_s) <= most_s:
-                break
-            j -= 1
-        kept[count] = j
+                reached = j
+            else:
+                beyond = j
+            j = (reached + beyond) // 2
+        kept[count] = reached
         count += 1
     return path[kept[:count]]
 
@@ -214,12 +259,13 @@ def flown_s(
     """
     length_m = span(b[0] - a[0], b[1] - a[1], b[2] - a[2])
     n = max(int(np.ceil(length_m / cell_m * PROBES_PER_CELL)), 1)
+    margin_m = min(limits.reserve_m, CELL_MARGIN * cell_m)
     part_m, total_s = climbed(length_m, b[2] - a[2], sine_of(limits)) / n, 0.0
     for i in range(n):
         share = (i + 0.5) / n
         for axis in range(3):
             probe.place_m[0, axis] = a[axis] + share * (b[axis] - a[axis])
-        speed_m_s = speed_at(probe, 0.0, limits, around, ends)
+        speed_m_s = speed_at(probe, margin_m, limits, around, ends)
         total_s += part_m / (speed_m_s if speed_m_s > BLOCKED else 1e-3 * limits.avoidance_m_s)
         if total_s > most_s:
             break

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from companion.planner.grid_search import BLOCKED, Probe, speed_at, straighten, way_around
-from companion.planner.limits import FlightLimits, Surroundings, ends_of
+from companion.planner.grid_search import straighten, way_around
+from companion.planner.limits import FlightLimits, Surroundings, ends_of, free_space, lacking
 from companion.planner.reference import LEG_SPEED, Way
 from missions.kernels import compiled
 from missions.mission_items import Track
@@ -25,10 +25,6 @@ JOIN_AHEAD = 1.0
 """Who is beside the track joins it this multiple of the distance ahead."""
 NEARLY_AS_NEAR_M = 0.3
 """Of several places on the track that are about as near, the earliest is joined."""
-CORNER_SHARE = 0.85
-"""Of the highest acceleration may be spent on turning."""
-CORNER_REACH = 4.0
-"""Corners are rounded within so many corridor widths to both sides."""
 MAX_DETOURS = 20
 MERGED_M = 1e-3
 """Points nearer to each other are one."""
@@ -89,7 +85,7 @@ def lay_guide(track: Track, index: int, from_m: Array, horizon_m: float, limits:
     legs = np.where(np.isnan(legs), limits.cruise_m_s, legs)
     vertices = np.vstack((from_m, points))
     legs = np.concatenate((legs[:1], legs))
-    way = _dense(vertices, legs, limits.corridor_m, horizon_m / SAMPLES_PER_HORIZON, limits)
+    way = _dense(vertices, legs, limits.corridor_m, horizon_m / SAMPLES_PER_HORIZON)
     n_track_points = len(track.points_m) - first
     return Guide(way, arc_length(vertices)[-n_track_points:], first)
 
@@ -143,12 +139,10 @@ def find_blocked(way: Way, from_m: float, gap_m: float, around: Surroundings, li
     """`first_blocked_piece` behind an arc, compiled: pieces less than `gap_m` apart are one; (-1, -1) without any."""
     m, first, last = len(way.arc_m), -1, -1
     begin = min(int(np.searchsorted(way.arc_m, from_m)), m - 1)
-    probe = Probe(np.empty((1, 3)), np.empty(1), np.empty(1))
     ends = ends_of(way.samples[begin, :3], way.samples[m - 1, :3], around, limits)
+    blocked = mark_blocked(way.samples[begin:], ends, around, limits)
     for i in range(begin, m):
-        for axis in range(3):
-            probe.place_m[0, axis] = way.samples[i, axis]
-        if speed_at(probe, 0.0, limits, around, ends) == BLOCKED:
+        if blocked[i - begin]:
             if first >= 0 and way.arc_m[i] - way.arc_m[last] > gap_m:
                 break
             first, last = (i if first < 0 else first), i
@@ -165,13 +159,10 @@ def blocked_samples(points_m: Array, around: Surroundings, limits: FlightLimits)
 @compiled
 def mark_blocked(points_m: Array, ends: Array, around: Surroundings, limits: FlightLimits) -> npt.NDArray[np.bool_]:
     """`blocked_samples`, compiled."""
-    out = np.empty(len(points_m), np.bool_)
-    probe = Probe(np.empty((1, 3)), np.empty(1), np.empty(1))
-    for i in range(len(points_m)):
-        for axis in range(3):
-            probe.place_m[0, axis] = points_m[i, axis]
-        out[i] = speed_at(probe, 0.0, limits, around, ends) == BLOCKED
-    return out
+    free_m, lacking_m, scarce_m = np.empty(len(points_m)), np.empty(len(points_m)), np.empty(len(points_m))
+    free_space(points_m, 0.0, around, free_m)
+    lacking(points_m, free_m + limits.reserve_m, 0.0, around, ends, limits, lacking_m, scarce_m)
+    return lacking_m > 0.0
 
 
 def nearest_on(points_m: Array, arc_m: Array, point_m: Array) -> tuple[float, float]:
@@ -206,27 +197,14 @@ def _remaining(track: Track, index: int, from_m: Array, limits: FlightLimits) ->
     return begin + first, remaining, legs
 
 
-def _dense(vertices: Array, legs_m_s: Array, corridor_m: float, spacing_m: float, limits: FlightLimits) -> Way:
+def _dense(vertices: Array, legs_m_s: Array, corridor_m: float, spacing_m: float) -> Way:
     """A way through (v, 3) vertices with (v,) speeds of the legs to them, sampled at least every `spacing_m`."""
     corners = arc_length(vertices)
     even = np.linspace(0.0, corners[-1], max(int(np.ceil(corners[-1] / spacing_m)), 1) + 1)
     arcs = np.unique(np.concatenate((even, corners)))
     points = resample(vertices, corners, arcs)
     leg = np.minimum(np.searchsorted(corners, arcs, side="left"), len(vertices) - 1)
-    speeds = np.minimum(legs_m_s[leg], corner_speeds(points, arcs, CORNER_REACH * corridor_m, limits))
-    return Way(np.column_stack((points, speeds, np.full(len(arcs), corridor_m))), arcs)
-
-
-def corner_speeds(points_m: Array, arc_m: Array, reach_m: float, limits: FlightLimits) -> Array:
-    """(m,) speeds [m/s] at which a polyline's turns, rounded within `reach_m` to both sides, can be flown."""
-    behind = resample(points_m, arc_m, np.maximum(arc_m - reach_m, 0.0))
-    ahead = resample(points_m, arc_m, np.minimum(arc_m + reach_m, arc_m[-1]))
-    to_here, onwards = points_m - behind, ahead - points_m
-    across = np.linalg.norm(np.cross(to_here, onwards), axis=1)
-    angle = np.arctan2(across, np.einsum("ij,ij->i", to_here, onwards))
-    length_m = 0.5 * (np.linalg.norm(to_here, axis=1) + np.linalg.norm(onwards, axis=1))
-    curvature = angle / np.maximum(length_m, 1e-6)
-    return np.sqrt(CORNER_SHARE * limits.acceleration_m_s2 / np.maximum(curvature, 1e-6))
+    return Way(np.column_stack((points, legs_m_s[leg], np.full(len(arcs), corridor_m))), arcs)
 
 
 def _with_detour(
@@ -296,7 +274,7 @@ def _corners(begin_m: Array, guide: Guide, b: int, limits: FlightLimits, around:
     end_m = guide.way.points_m[b].copy()
     room_m = max(0.3 * float(np.linalg.norm(end_m - begin_m)), 4.0 * _pull_m(limits))
     corners = way_around(begin_m, end_m, room_m, cell_m, limits, around)
-    return corners if len(corners) else way_around(begin_m, end_m, 3.0 * room_m, cell_m, limits, around)
+    return corners if len(corners) else way_around(begin_m, end_m, 3.0 * room_m, cell_m, limits, around, narrow=True)
 
 
 def _detour(
@@ -320,7 +298,7 @@ def _detour(
             corners, b = straight, next_point
     legs = np.full(len(corners), way.samples[a : b + 1, LEG_SPEED].max())
     corridor_m = WIDER_AROUND_OBSTACLES * limits.corridor_m
-    return b, _dense(corners, legs, corridor_m, horizon_m / SAMPLES_PER_HORIZON, limits)
+    return b, _dense(corners, legs, corridor_m, horizon_m / SAMPLES_PER_HORIZON)
 
 
 def _pull_m(limits: FlightLimits) -> float:

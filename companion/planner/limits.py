@@ -16,6 +16,8 @@ Array = npt.NDArray[np.float64]
 
 EASING = 0.5
 """Required clearance and height grow by this much per metre from what the start (or the goal) has."""
+EASED_SHARE = 0.5
+"""A start counts as having less than it has by this share of the reserve: just beside it the map may say less."""
 ROUNDING_M = 1e-6
 
 
@@ -36,8 +38,11 @@ class FlightLimits(NamedTuple):
     climb_tangent: float
     turn_radius_m: float
     clearance_m: float
+    """No plan comes nearer to anything ..."""
     contact_m: float
-    """In launch zones nothing more is required than not to touch."""
+    """... or, in launch zones, nearer than this: there nothing more is required than not to touch ..."""
+    reserve_m: float
+    """... and so much more is kept where that is possible: for tracking errors and what the map does not resolve."""
     clearance_cap_m: float
     """More clearance than this earns nothing."""
     height_m: float
@@ -66,24 +71,22 @@ EAST, NORTH, UP, END_CLEARANCE, END_HEIGHT, END_OUTSIDE = range(6)
 def flight_limits(mission: Mission, reserve: Reserve) -> FlightLimits:
     """The limits that plans of this mission keep, when they use no more of them than `reserve` leaves."""
     limits, least_m = mission.limits, reserve.gnss_margin_m if mission.site is Site.OUTDOOR else 0.0
-    cap_m = mission.planner.clearance_cap_m
-
-    def wider(distance_m: float) -> float:
-        return distance_m + max(reserve.distance_share * distance_m, least_m)
-
+    cap_m, clearance_m = mission.planner.clearance_cap_m, max(limits.clearance_m, limits.body_radius_m)
+    avoidance_m = limits.avoidance_distance_m
     return FlightLimits(
         cruise_m_s=limits.cruise_speed_m_s * reserve.limit_share,
         avoidance_m_s=limits.avoidance_speed_m_s * reserve.limit_share,
-        avoidance_distance_m=wider(limits.avoidance_distance_m),
+        avoidance_distance_m=avoidance_m + max(reserve.distance_share * avoidance_m, least_m),
         nominal_ratio=reserve.nominal_share / reserve.limit_share,
         acceleration_m_s2=limits.acceleration_m_s2,
         braking_m_s2=limits.acceleration_m_s2 * reserve.braking_share,
         jerk_m_s3=limits.acceleration_m_s2 * reserve.jerk_per_acceleration_hz,
         climb_tangent=float(np.tan(np.radians(min(limits.climb_angle_deg, 89.0)))),
         turn_radius_m=limits.turn_radius_m,
-        clearance_m=wider(max(limits.clearance_m, limits.body_radius_m)),
-        contact_m=wider(limits.body_radius_m),
-        clearance_cap_m=cap_m if cap_m is not None else 2.0 * max(limits.avoidance_distance_m, limits.clearance_m),
+        clearance_m=clearance_m,
+        contact_m=limits.body_radius_m,
+        reserve_m=max(reserve.distance_share * clearance_m, least_m),
+        clearance_cap_m=cap_m if cap_m is not None else 2.0 * max(avoidance_m, limits.clearance_m),
         height_m=limits.height_m,
         corridor_m=reserve.corridor_share * mission.onboard.horizon_m,
     )
@@ -115,7 +118,7 @@ def ends_of(start_m: Array, goal_m: Array, around: Surroundings, limits: FlightL
         ends[0, axis], ends[1, axis] = start_m[axis], goal_m[axis]
     for i in range(2):
         east, north, up = ends[i, 0], ends[i, 1], ends[i, 2]
-        ends[i, END_CLEARANCE] = free_at(east, north, up, around) - ROUNDING_M
+        ends[i, END_CLEARANCE] = free_at(east, north, up, around) - EASED_SHARE * limits.reserve_m
         if i == 0:
             ends[i, END_CLEARANCE] = min(ends[i, END_CLEARANCE], mover_clearance(east, north, up, 0.0, around.moving))
         ends[i, END_HEIGHT] = up - terrain_height_at(east, north, around.obstacles) - ROUNDING_M
@@ -134,6 +137,7 @@ def lacking(
     ends: Array,
     limits: FlightLimits,
     out: Array,
+    scarce_m: Array,
 ) -> None:
     """How much each point lacks of the clearance, height, flight range and separation that are required of it.
 
@@ -148,6 +152,7 @@ def lacking(
         ends: (2, 6) of the plan.
         limits: what is required.
         out: (m,) is filled with metres; 0 where all is kept.
+        scarce_m: (m,) is filled with what lacks of the clearance and the reserve [m].
     """
     obstacles, zones_m, room_m, eased = around.obstacles, around.zones_m, around.room_m, is_eased(ends, limits)
     moving = around.moving
@@ -166,6 +171,7 @@ def lacking(
                 if e == 0:
                     allowed_m = max(ends[e, END_OUTSIDE] - eased_m, 0.0)
         ground_m = terrain_height_at(east, north, obstacles) if len(obstacles.peaks) > 0 else 0.0
+        scarce_m[i] = max(clearance_m + limits.reserve_m - free_m[i], 0.0)
         out[i] = max(clearance_m - free_m[i], 0.0) + max(height_m - (up - ground_m), 0.0)
         out[i] += max(outside(points_m, i, room_m) - allowed_m, 0.0)
         if crowded:
@@ -175,9 +181,9 @@ def lacking(
 @compiled
 def is_eased(ends: Array, limits: FlightLimits) -> bool:
     """An end has less than what is required in general."""
-    lacks = False
+    lacks, wanted_m = False, limits.clearance_m + limits.reserve_m
     for e in range(2):
-        lacks = lacks or ends[e, END_CLEARANCE] < limits.clearance_m or ends[e, END_HEIGHT] < limits.height_m
+        lacks = lacks or ends[e, END_CLEARANCE] < wanted_m or ends[e, END_HEIGHT] < limits.height_m
         lacks = lacks or ends[e, END_OUTSIDE] > ROUNDING_M
     return lacks
 

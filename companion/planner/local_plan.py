@@ -138,7 +138,7 @@ def resting_place(way: Way, from_m: float, reach_m: float, limits: FlightLimits,
             break
         if arc_m <= from_m + reach_m:
             place = way.samples[i]
-            if free_at(place[0], place[1], place[2], around) >= limits.clearance_m:
+            if free_at(place[0], place[1], place[2], around) >= limits.clearance_m + limits.reserve_m:
                 found_m = arc_m
                 break
     return found_m
@@ -159,6 +159,7 @@ def pose(start: Array, reference: Reference, planner: LocalPlanner, around: Surr
         shape.layout,
         np.empty((len(shape.fit_path) + 6, 3)),
         np.empty((n, 9)),
+        np.empty(n),
         np.empty(n),
         np.empty(n),
     )

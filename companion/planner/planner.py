@@ -1,6 +1,7 @@
 """The door of the onboard planner: a request in, a trajectory that ends at rest (or the reason why not) out."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -81,6 +82,15 @@ class Plan:
     reaches_end: bool = False
 
 
+class Outlook(NamedTuple):
+    """When a trajectory breaks what the mission requires, vehicle time [s]; infinite where it never does."""
+
+    lacks_s: float
+    """For the first time: reason enough for another plan."""
+    dangerous_s: float
+    """By more than the reserve, which is more than the map's noise: reason enough to brake."""
+
+
 class Planner:
     """Plans for one vehicle of one mission.
 
@@ -97,7 +107,6 @@ class Planner:
     ) -> None:
         horizon_m, phi = mission.onboard.horizon_m, mission.planner
         self.limits = flight_limits(mission, reserve)
-        self._required = flight_limits(mission, replace(reserve, distance_share=0.0, gnss_margin_m=0.0))
         self.around = surroundings(mission, obstacles.pack(mission.world.as_known()), zones_m)
         self._local = LocalPlanner(
             self.limits,
@@ -111,10 +120,10 @@ class Planner:
                 self.around.obstacles,
                 self.around.room_m,
                 KNOWN_WITHIN_VOXELS * mission.onboard.voxel_m,
-                self.limits.clearance_m,
+                self.limits.clearance_m + self.limits.reserve_m,
             ),
             mission.onboard.voxel_m,
-            REACH_FARTHER * max(self.limits.avoidance_distance_m, self.limits.clearance_m),
+            REACH_FARTHER * max(self.limits.avoidance_distance_m, self.limits.clearance_m + self.limits.reserve_m),
             mission.limits.body_radius_m,
         )
         self.voxel_m = mission.onboard.voxel_m
@@ -163,23 +172,20 @@ class Planner:
 
     def is_clear(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> bool:
         """The rest of a trajectory has no conflict."""
-        return self.conflict_s(trajectory, now_s, neighbours) == np.inf
+        return self.outlook(trajectory, now_s, neighbours).lacks_s == np.inf
 
-    def conflict_s(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> float:
+    def outlook(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> Outlook:
         """When the rest of a trajectory first breaks what the mission requires (the reserve is not asked for).
 
         It is judged against what is known, what was seen until now, movers as they are expected, and the neighbours'
         trajectories. May be asked in another thread than plans are made in.
-
-        Returns:
-            vehicle time [s]; infinite when it never does.
         """
         begin_s = max(now_s, trajectory.start_s)
         around = self._around(trajectory.at(begin_s).position_m, begin_s, neighbours)
         done = min(max(now_s - trajectory.start_s, 0.0), trajectory.duration_s) / trajectory.knot_interval_s
         control_m, knot_s = trajectory.control_points_m, trajectory.knot_interval_s
-        after_s, _ = first_lack(control_m, knot_s, done, self._required, around)
-        return begin_s + after_s
+        lacks_s, dangerous_s = first_lack(control_m, knot_s, done, self.limits, around)
+        return Outlook(begin_s + lacks_s, begin_s + dangerous_s)
 
     def may_rest(self, places_m: Array) -> npt.NDArray[np.bool_]:
         """Which of (n, 3) places are clear enough to rest there, as far as is known and was seen."""
@@ -187,7 +193,7 @@ class Planner:
         free_space(places_m, 0.0, self.around._replace(field=self._map.view.field), free_m)
         low_m, high_m = self.around.room_m
         inside = np.all((places_m >= low_m) & (places_m <= high_m), axis=1)
-        return inside & (free_m >= self.limits.clearance_m)
+        return inside & (free_m >= self.limits.clearance_m + self.limits.reserve_m)
 
     def _around(self, place_m: Array, begin_s: float, neighbours: tuple[Neighbour, ...]) -> Surroundings:
         """Everything around a vehicle that is at a place at a time."""

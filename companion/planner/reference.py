@@ -17,10 +17,17 @@ Array = npt.NDArray[np.float64]
 PATH_SAMPLES = 64
 JOIN_SLOPE = 6.0
 """Who is beside the way joins it within this multiple of the distance, but not before a quarter of the plan."""
-PUSHES = 5
+STANDING_M_S = 0.3
+"""Who is slower may leave in any direction."""
+ROUNDS, SMOOTHINGS = 4, 3
+"""Rounding: as often the path is pushed off obstacles, each time after so many smoothings: about a knot's length."""
 PUSHED_FARTHER_M = 0.02
 PROBE_M = 0.01
-"""How the path is pushed off obstacles: rounds, what is added for the rounding between them, step of the slope."""
+"""How the path is pushed off obstacles: what is added for the rounding between them, step of the slope."""
+CORNER_SHARE = 0.85
+"""Of the highest acceleration may be spent on turning."""
+CORNER_SAMPLES = 2
+"""Turns are measured over so many samples to both sides."""
 SHORTEST_S = 1.0
 SLOWEST_M_S = 0.05
 """A path is never timed slower than this between two samples, so that times stay finite at rest."""
@@ -80,12 +87,13 @@ def lay_reference(
     """
     path, aims = np.empty((PATH_SAMPLES, 5)), np.empty(PATH_SAMPLES)
     arc, times = np.zeros(PATH_SAMPLES), np.zeros(PATH_SAMPLES)
-    follow(way, from_m, to_m, start, path)
-    keep_off(path, limits, around)
+    n_pinned = follow(way, from_m, to_m, start, path)
+    relax(path, n_pinned, limits, around)
     free_m = np.empty(PATH_SAMPLES)
     fill_standing(path, around, free_m)
     for j in range(PATH_SAMPLES):
         aims[j] = min(path[j, LEG_SPEED], speed_limit(free_m[j], limits) * limits.nominal_ratio)
+        aims[j] = min(aims[j], corner_speed(path, j, limits))
         if j > 0:
             arc[j] = arc[j - 1] + apart(path, j, j - 1)
     reach_speeds(arc, aims, span(start[1, 0], start[1, 1], start[1, 2]), limits.braking_m_s2)
@@ -99,8 +107,12 @@ def lay_reference(
 
 
 @compiled
-def follow(way: Way, from_m: float, to_m: float, start: Array, path: Array) -> None:
-    """Sample a piece of `way` at equal arcs into `path` (n, 5), joined smoothly from the start's position."""
+def follow(way: Way, from_m: float, to_m: float, start: Array, path: Array) -> int:
+    """Sample a piece of `way` at equal arcs into `path` (n, 5), joined smoothly from the start's place and direction.
+
+    Returns:
+        how many samples at its beginning the start decides: the second one, too, of a vehicle that moves.
+    """
     samples, arc_m = way.samples, way.arc_m
     n, i, length_m = len(path), 0, to_m - from_m
     for j in range(n):
@@ -111,50 +123,81 @@ def follow(way: Way, from_m: float, to_m: float, start: Array, path: Array) -> N
         share = min(max((at_m - arc_m[i]) / max(arc_m[after] - arc_m[i], 1e-9), 0.0), 1.0)
         for column in range(5):
             path[j, column] = samples[i, column] + share * (samples[after, column] - samples[i, column])
-    off_east, off_north, off_up = start[0, 0] - path[0, 0], start[0, 1] - path[0, 1], start[0, 2] - path[0, 2]
-    joined_m = min(max(JOIN_SLOPE * span(off_east, off_north, off_up), 0.25 * length_m), length_m)
+    off, turned, step_m, speed_m_s = np.empty(3), np.zeros(3), length_m / (n - 1), span(start[1, 0], start[1, 1], start[1, 2])
+    for axis in range(3):
+        off[axis] = start[0, axis] - path[0, axis]
+        if speed_m_s > STANDING_M_S:
+            turned[axis] = start[1, axis] / speed_m_s - (path[1, axis] - path[0, axis]) / max(step_m, 1e-9)
+    joined_m = max(JOIN_SLOPE * span(off[0], off[1], off[2]), 0.25 * length_m)
+    joined_m = min(joined_m, length_m)
     for j in range(n):
-        u = min(length_m * j / (n - 1) / max(joined_m, 1e-9), 1.0)
-        left = 1.0 - u * u * (3.0 - 2.0 * u)
-        path[j, 0] += left * off_east
-        path[j, 1] += left * off_north
-        path[j, 2] += left * off_up
+        u = min(step_m * j / max(joined_m, 1e-9), 1.0)
+        left, onwards_m = 1.0 - u * u * (3.0 - 2.0 * u), joined_m * u * (1.0 - u) * (1.0 - u)
+        for axis in range(3):
+            path[j, axis] += left * off[axis] + onwards_m * turned[axis]
+    return 2 if speed_m_s > STANDING_M_S else 1
 
 
 @compiled
-def keep_off(path: Array, limits: FlightLimits, around: Surroundings) -> None:
-    """Push a path (n, 5) out to the avoidance distance where it lacks less of it than the corridor is wide.
+def relax(path: Array, n_pinned: int, limits: FlightLimits, around: Surroundings) -> None:
+    """Round the corners of a path (n, 5) as far as a spline would, and push it off what it comes too near to.
 
-    Passing an obstacle a little farther off at full speed is better than passing it slowly.
+    Its end and its first `n_pinned` samples stay.
     """
-    n, wanted_m = len(path), max(limits.avoidance_distance_m, limits.clearance_m) + PUSHED_FARTHER_M
-    pushed, moved = np.zeros((n, 3)), path.copy()
-    free = np.empty(n)
-    for _ in range(PUSHES):
-        fill_standing(moved, around, free)
-        lacks = False
-        for j in range(1, n - 1):
-            free_m = free[j]
-            lack_m = wanted_m - free_m
-            lacks = lacks or 0.0 < lack_m < path[j, CORRIDOR]
-            if 0.0 < lack_m < path[j, CORRIDOR]:
-                for axis in range(3):
-                    moved[j, axis] += PROBE_M
-                    slope = (free_at(moved[j, 0], moved[j, 1], moved[j, 2], around) - free_m) / PROBE_M
-                    moved[j, axis] -= PROBE_M
-                    pushed[j, axis] += slope * lack_m
-        if not lacks:
-            break
+    free_m, moved = np.empty(len(path)), np.empty((len(path), 3))
+    for _ in range(ROUNDS):
+        for _ in range(SMOOTHINGS):
+            smooth(path, n_pinned, moved)
+        push(path, n_pinned, limits, around, free_m)
+    smooth(path, n_pinned, moved)
+    push(path, n_pinned, limits, around, free_m)
+
+
+@compiled
+def smooth(path: Array, n_pinned: int, moved: Array) -> None:
+    """Move each sample of a path halfway to the middle of its neighbours; `moved` (n, 3) is room to work in."""
+    for j in range(n_pinned, len(path) - 1):
         for axis in range(3):
-            before = 0.0
-            for j in range(1, n - 1):
-                smooth = 0.25 * before + 0.5 * pushed[j, axis] + 0.25 * pushed[j + 1, axis]
-                before = pushed[j, axis]
-                pushed[j, axis] = smooth
-                moved[j, axis] = path[j, axis] + smooth
-    for j in range(n):
+            moved[j, axis] = 0.25 * (path[j - 1, axis] + path[j + 1, axis]) + 0.5 * path[j, axis]
+    for j in range(n_pinned, len(path) - 1):
         for axis in range(3):
             path[j, axis] = moved[j, axis]
+
+
+@compiled
+def push(path: Array, n_pinned: int, limits: FlightLimits, around: Surroundings, free_m: Array) -> None:
+    """Push a path (n, 5) out to the avoidance distance where it lacks less of it than the corridor is wide.
+
+    Passing an obstacle a little farther off at full speed is better than passing it slowly. Where more lacks, it is
+    pushed out to the required clearance. `free_m` (n,) is room to work in.
+    """
+    slope, clear_m = np.empty(3), limits.clearance_m + limits.reserve_m
+    fill_standing(path, around, free_m)
+    for j in range(n_pinned, len(path) - 1):
+        lack_m = max(limits.avoidance_distance_m, clear_m) + PUSHED_FARTHER_M - free_m[j]
+        if lack_m > path[j, CORRIDOR]:
+            lack_m = clear_m + PUSHED_FARTHER_M - free_m[j]
+        if lack_m <= 0.0 or lack_m > max(path[j, CORRIDOR], limits.clearance_m):
+            continue
+        for axis in range(3):
+            path[j, axis] += PROBE_M
+            slope[axis] = (free_at(path[j, 0], path[j, 1], path[j, 2], around) - free_m[j]) / PROBE_M
+            path[j, axis] -= PROBE_M
+        steepness = max(span(slope[0], slope[1], slope[2]), 1.0)
+        for axis in range(3):
+            path[j, axis] += lack_m * slope[axis] / steepness
+
+
+@compiled
+def corner_speed(path: Array, j: int, limits: FlightLimits) -> float:
+    """Speed [m/s] at which the turn of a path (n, 3 or more) about its j-th sample can be flown."""
+    j = min(max(j, CORNER_SAMPLES), len(path) - 1 - CORNER_SAMPLES)
+    before, after, across2, along = j - CORNER_SAMPLES, j + CORNER_SAMPLES, 0.0, 0.0
+    for axis in range(3):
+        second = path[after, axis] - 2.0 * path[j, axis] + path[before, axis]
+        across2 += second * second
+    along = 0.5 * (apart(path, j, before) + apart(path, after, j))
+    return np.sqrt(CORNER_SHARE * limits.acceleration_m_s2 * along * along / max(np.sqrt(across2), 1e-9))
 
 
 @compiled

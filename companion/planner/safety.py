@@ -10,13 +10,15 @@ from missions.kernels import compiled
 Array = npt.NDArray[np.float64]
 
 CHECKS_PER_SEGMENT = 6
+SLACK_SHARE = 0.25
+"""Of the reserve: a search looks at fewer places, and what lacks between these is this at most."""
 
 
 @compiled
 def first_lack(
     control: Array, knot_s: float, from_segment: float, limits: FlightLimits, around: Surroundings
 ) -> tuple[float, float]:
-    """When the rest of a trajectory first lacks something that is required, and how much it lacks at most.
+    """When the rest of a trajectory first lacks something that is required, and when dangerously.
 
     Args:
         control: (n, 3) control points, ENU [m].
@@ -26,19 +28,22 @@ def first_lack(
         around: everything known, what moves from that moment on.
 
     Returns:
-        time from that moment on [s], infinite when it is safe; metres, 0 when it is safe.
+        two times from that moment on [s], infinite where it is safe: when it first lacks something, and when it lacks
+        more than the reserve, which is more than noise.
     """
     left = len(control) - 3 - from_segment
     steps = max(int(np.ceil(left * CHECKS_PER_SEGMENT)), 1)
-    points, free_m, lacking_m = np.empty((steps + 1, 3)), np.empty(steps + 1), np.empty(steps + 1)
+    points, free_m = np.empty((steps + 1, 3)), np.empty(steps + 1)
+    lacking_m, scarce_m = np.empty(steps + 1), np.empty(steps + 1)
     for i in range(steps + 1):
         spline_point(control, from_segment + left * i / steps, points[i])
     step_s = knot_s * left / steps
     free_space(points, step_s, around, free_m)
-    lacking(points, free_m, step_s, around, ends_of(points[0], control[-1], around, limits), limits, lacking_m)
-    first_s, worst_m = np.inf, 0.0
+    lacking(points, free_m, step_s, around, ends_of(points[0], control[-1], around, limits), limits, lacking_m, scarce_m)
+    first_s = dangerous_s = np.inf
     for i in range(steps + 1):
-        if lacking_m[i] > 0.0:
+        if lacking_m[i] > SLACK_SHARE * limits.reserve_m:
             first_s = min(first_s, i * step_s)
-        worst_m = max(worst_m, lacking_m[i])
-    return first_s, worst_m
+        if lacking_m[i] > limits.reserve_m:
+            dangerous_s = min(dangerous_s, i * step_s)
+    return first_s, dangerous_s

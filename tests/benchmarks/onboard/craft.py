@@ -13,7 +13,7 @@ from companion.events import Odometry
 from companion.fleet.exchange import Exchange
 from companion.fleet.neighbour import Neighbour
 from companion.flight import Flight
-from companion.planner.planner import Plan, Planner, PlanRequest
+from companion.planner.planner import Outlook, Plan, Planner, PlanRequest
 from companion.sensing.scan import Scan
 from companion.settings import PilotSettings, Reserve, SearchSettings
 from missions.frames import AutopilotFrame
@@ -55,12 +55,12 @@ class MeasuredPlanner(Planner):
         self.map_ms.append((time.thread_time() - began_s) * 1e3)
         self.tick_ms.append(0.0)
 
-    def conflict_s(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> float:
+    def outlook(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> Outlook:
         began_s = time.thread_time()
-        conflict_s = super().conflict_s(trajectory, now_s, neighbours)
+        outlook = super().outlook(trajectory, now_s, neighbours)
         if self.tick_ms and self.tick_ms[-1] == 0.0:
             self.tick_ms[-1] = (time.thread_time() - began_s) * 1e3
-        return conflict_s
+        return outlook
 
 
 class Craft:
