@@ -221,7 +221,7 @@ def climbed(length_m: float, up_m: float, climb_sine: float) -> float:
 
 @compiled
 def straighten(path: Array, cell_m: float, limits: FlightLimits, around: Surroundings, ends: Array) -> Array:
-    """Leave out the corners of a (m, 3) path where the straight line is clear and no slower; the farthest by bisection."""
+    """Leave out corners of a (m, 3) path where the straight line is clear and no slower, found by bisection."""
     probe, m = new_probe(), len(path)
     times = np.zeros(m)
     for i in range(1, m):

@@ -98,6 +98,8 @@ def lead_around(
     cell_m: float,
     from_m: float = 0.0,
     place_m: Array | None = None,
+    *,
+    strictly: bool = False,
 ) -> Guide | None:
     """The guide with its blocked pieces replaced by ways around; None when there is no way.
 
@@ -109,9 +111,11 @@ def lead_around(
         cell_m: of the grid on which ways around are looked for.
         from_m: how much of the guide is done [m].
         place_m: (3,) where the vehicle is; without it, on the guide.
+        strictly: pieces that lack less than the reserve are blocked as well; usually plans find room beside them.
     """
+    slack_m = 0.0 if strictly else limits.reserve_m
     for _ in range(MAX_DETOURS):
-        piece = first_blocked_piece(guide.way, around, limits, from_m)
+        piece = first_blocked_piece(guide.way, around, limits, from_m, slack_m)
         if piece is None:
             return guide
         detoured = _with_detour(guide, piece, around, limits, horizon_m, cell_m, from_m, place_m)
@@ -124,23 +128,25 @@ def lead_around(
 
 
 def first_blocked_piece(
-    way: Way, around: Surroundings, limits: FlightLimits, from_m: float = 0.0
+    way: Way, around: Surroundings, limits: FlightLimits, from_m: float = 0.0, slack_m: float = 0.0
 ) -> tuple[int, int] | None:
     """(first, last) sample indices of the first piece of a way that lacks clearance or height; None when all is clear.
 
     Blocked samples so near to each other that their detours would meet are one piece.
     """
-    first, last = find_blocked(way, from_m, 4.0 * _pull_m(limits), around, limits)
+    first, last = find_blocked(way, from_m, 4.0 * _pull_m(limits), slack_m, around, limits)
     return None if first < 0 else (int(first), int(last))
 
 
 @compiled
-def find_blocked(way: Way, from_m: float, gap_m: float, around: Surroundings, limits: FlightLimits) -> tuple[int, int]:
+def find_blocked(
+    way: Way, from_m: float, gap_m: float, slack_m: float, around: Surroundings, limits: FlightLimits
+) -> tuple[int, int]:
     """`first_blocked_piece` behind an arc, compiled: pieces less than `gap_m` apart are one; (-1, -1) without any."""
     m, first, last = len(way.arc_m), -1, -1
     begin = min(int(np.searchsorted(way.arc_m, from_m)), m - 1)
     ends = ends_of(way.samples[begin, :3], way.samples[m - 1, :3], around, limits)
-    blocked = mark_blocked(way.samples[begin:], ends, around, limits)
+    blocked = mark_blocked(way.samples[begin:], ends, slack_m, around, limits)
     for i in range(begin, m):
         if blocked[i - begin]:
             if first >= 0 and way.arc_m[i] - way.arc_m[last] > gap_m:
@@ -153,15 +159,17 @@ def blocked_samples(points_m: Array, around: Surroundings, limits: FlightLimits)
     """(m,) which of (m, 3) points lack clearance, height or flight range, eased near the first and the last one."""
     points_m = np.ascontiguousarray(points_m)
     ends = ends_of(points_m[0].copy(), points_m[-1].copy(), around, limits)
-    return mark_blocked(points_m, ends, around, limits)
+    return mark_blocked(points_m, ends, 0.0, around, limits)
 
 
 @compiled
-def mark_blocked(points_m: Array, ends: Array, around: Surroundings, limits: FlightLimits) -> npt.NDArray[np.bool_]:
-    """`blocked_samples`, compiled."""
+def mark_blocked(
+    points_m: Array, ends: Array, slack_m: float, around: Surroundings, limits: FlightLimits
+) -> npt.NDArray[np.bool_]:
+    """`blocked_samples`, compiled; those that lack less than `slack_m` are not."""
     free_m, lacking_m, scarce_m = np.empty(len(points_m)), np.empty(len(points_m)), np.empty(len(points_m))
     free_space(points_m, 0.0, around, free_m)
-    lacking(points_m, free_m + limits.reserve_m, 0.0, around, ends, limits, lacking_m, scarce_m)
+    lacking(points_m, free_m + slack_m, 0.0, around, ends, limits, lacking_m, scarce_m)
     return lacking_m > 0.0
 
 

@@ -157,18 +157,17 @@ class Planner:
         return self._map.certain()
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Plan along the request's guide, which is first led around what blocks it."""
+        """Plan along the request's guide, which is first led around what blocks it.
+
+        Where no plan squeezes past a narrow place that way, it is led around narrow places as well.
+        """
         around = self._around(request.start.position_m, request.start_s, request.neighbours)
-        place_m = request.start.position_m
-        guide = lead_around(
-            request.guide, around, self.limits, self.horizon_m, self.cell_m, request.arc_m, np.asarray(place_m)
-        )
-        if guide is None or guide is request.guide:  # without a way around, as far as it goes
-            return self._plan_along(request, request.guide, request.arc_m, around)
-        begun_anew = np.linalg.norm(guide.way.points_m[0] - place_m) < MERGED_M
-        from_m = 0.0 if begun_anew else max(request.arc_m - self.horizon_m, 0.0)
-        arc_m = guide.project(place_m, from_m, 2.0 * self.horizon_m)
-        return self._plan_along(request, guide, arc_m, around)
+        guide, arc_m = self._led(request, around, strictly=False)
+        plan = self._plan_along(request, guide, arc_m, around)
+        if plan.trajectory is not None:
+            return plan
+        other, arc_m = self._led(request, around, strictly=True)
+        return plan if other is guide or other is request.guide else self._plan_along(request, other, arc_m, around)
 
     def is_clear(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> bool:
         """The rest of a trajectory has no conflict."""
@@ -204,6 +203,18 @@ class Planner:
     def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
         """Come to rest on the committed path as soon as the limits allow."""
         return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)
+
+    def _led(self, request: PlanRequest, around: Surroundings, *, strictly: bool) -> tuple[Guide, float]:
+        """The request's guide led around what blocks it, or itself if there is no way; and how much of it is done."""
+        place_m, limits = np.asarray(request.start.position_m), self.limits
+        guide = lead_around(
+            request.guide, around, limits, self.horizon_m, self.cell_m, request.arc_m, place_m, strictly=strictly
+        )
+        if guide is None or guide is request.guide:  # without a way around, as far as it goes
+            return request.guide, request.arc_m
+        begun_anew = np.linalg.norm(guide.way.points_m[0] - place_m) < MERGED_M
+        from_m = 0.0 if begun_anew else max(request.arc_m - self.horizon_m, 0.0)
+        return guide, guide.project(place_m, from_m, 2.0 * self.horizon_m)
 
     def _plan_along(self, request: PlanRequest, guide: Guide, arc_m: float, around: Surroundings) -> Plan:
         start = np.ascontiguousarray(request.start, dtype=float)

@@ -123,7 +123,12 @@ def follow(way: Way, from_m: float, to_m: float, start: Array, path: Array) -> i
         share = min(max((at_m - arc_m[i]) / max(arc_m[after] - arc_m[i], 1e-9), 0.0), 1.0)
         for column in range(5):
             path[j, column] = samples[i, column] + share * (samples[after, column] - samples[i, column])
-    off, turned, step_m, speed_m_s = np.empty(3), np.zeros(3), length_m / (n - 1), span(start[1, 0], start[1, 1], start[1, 2])
+    off, turned, step_m, speed_m_s = (
+        np.empty(3),
+        np.zeros(3),
+        length_m / (n - 1),
+        span(start[1, 0], start[1, 1], start[1, 2]),
+    )
     for axis in range(3):
         off[axis] = start[0, axis] - path[0, axis]
         if speed_m_s > STANDING_M_S:

@@ -39,7 +39,9 @@ def first_lack(
         spline_point(control, from_segment + left * i / steps, points[i])
     step_s = knot_s * left / steps
     free_space(points, step_s, around, free_m)
-    lacking(points, free_m, step_s, around, ends_of(points[0], control[-1], around, limits), limits, lacking_m, scarce_m)
+    lacking(
+        points, free_m, step_s, around, ends_of(points[0], control[-1], around, limits), limits, lacking_m, scarce_m
+    )
     first_s = dangerous_s = np.inf
     for i in range(steps + 1):
         if lacking_m[i] > SLACK_SHARE * limits.reserve_m:

@@ -12,7 +12,7 @@ from companion.pilot import Pilot
 from companion.planner.braking import brake_along
 from companion.planner.guide import Guide, lay_guide
 from companion.planner.limits import flight_limits
-from companion.planner.planner import Plan, PlanRequest
+from companion.planner.planner import Outlook, Plan, PlanRequest
 from companion.settings import CompanionSettings, PlanningMode, Reserve
 from missions.frames import AutopilotFrame, GeodeticPoint
 from missions.mission import Mission, load_mission
@@ -48,8 +48,8 @@ class StraightPlanner:
     def lay_guide(self, track: Track, index: int, from_m: np.ndarray) -> Guide:
         return lay_guide(track, index, from_m, INDOOR.onboard.horizon_m, self.limits)
 
-    def conflict_s(self, trajectory: Trajectory, now_s: float) -> float:
-        return np.inf if self.clear else now_s
+    def outlook(self, trajectory: Trajectory, now_s: float) -> Outlook:
+        return Outlook(np.inf, np.inf) if self.clear else Outlook(now_s, now_s)
 
     def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
         return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)

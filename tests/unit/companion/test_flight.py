@@ -5,6 +5,7 @@ import pytest
 
 from companion import events, instructions
 from companion.events import FlightMode
+from companion.planner.planner import Outlook
 from companion.settings import PilotSettings
 from missions.mission_items import MissionItem, plan_id
 from missions.trajectory import Trajectory
@@ -115,8 +116,9 @@ class SeesAhead(StraightPlanner):
         self.blocked: Trajectory | None = None
         self.conflict_at_s = np.inf
 
-    def conflict_s(self, trajectory: Trajectory, now_s: float) -> float:
-        return self.conflict_at_s if trajectory is self.blocked else np.inf
+    def outlook(self, trajectory: Trajectory, now_s: float) -> Outlook:
+        at_s = self.conflict_at_s if trajectory is self.blocked else np.inf
+        return Outlook(at_s, at_s)
 
 
 def blocked_ahead(in_s: float) -> Rig:

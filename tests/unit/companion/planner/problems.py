@@ -98,7 +98,7 @@ def value_in_numpy(x: Array, problem: LocalProblem, mission: Mission = INDOOR) -
     motion_end = np.append(np.ones(len(times_s) - 1), 0.0)  # it rests at the end
     speed, hard_m = speed * motion_end, hard_m * motion_end
     free_m = obstacles.clearance(motion.position_m, around.obstacles)
-    lacking_m = lacking_in_numpy(motion.position_m, free_m, problem)
+    lacking_m, scarce_m = lacking_in_numpy(motion.position_m, free_m, problem)
     hard = lacking_m.sum() / limits.clearance_m
     near = free_m < limits.avoidance_distance_m
     allowed = np.minimum(np.where(near, limits.avoidance_m_s, limits.cruise_m_s), samples[1:, SPEED_CAP])
@@ -108,7 +108,7 @@ def value_in_numpy(x: Array, problem: LocalProblem, mission: Mission = INDOOR) -
     hard += np.maximum(hard_m / allowed_m_s2 - 1.0, 0.0).sum()
     thirds = np.linalg.norm(np.diff(trajectory.control_points_m, n=3, axis=0), axis=1)
     hard += np.maximum(thirds / (limits.jerk_m_s3 * knot_s**3) - 1.0, 0.0).sum()
-    soft = climb_and_turn_in_numpy(motion, motion_end, limits)
+    soft = climb_and_turn_in_numpy(motion, motion_end, limits) + scarce_m.sum() / limits.clearance_m
     off = motion.position_m - samples[1:, :3]
     along = np.einsum("ij,ij->i", off, samples[1:, TANGENT : TANGENT + 3])
     beside = np.sqrt(np.maximum(np.einsum("ij,ij->i", off, off) - along**2, 0.0))
@@ -124,8 +124,8 @@ def value_in_numpy(x: Array, problem: LocalProblem, mission: Mission = INDOOR) -
     return trajectory, np.array([length, clearance, height, hard, soft])
 
 
-def lacking_in_numpy(points_m: Array, free_m: Array, problem: LocalProblem) -> Array:
-    """What points lack of clearance, height and flight range [m]."""
+def lacking_in_numpy(points_m: Array, free_m: Array, problem: LocalProblem) -> tuple[Array, Array]:
+    """What points lack of clearance, height and flight range [m]; and what lacks of clearance and reserve."""
     limits, around, ends = problem.limits, problem.around, problem.ends
     required_m = np.full(len(points_m), limits.clearance_m)
     height_m = np.full(len(points_m), limits.height_m)
@@ -141,11 +141,12 @@ def lacking_in_numpy(points_m: Array, free_m: Array, problem: LocalProblem) -> A
             allowed_m = np.maximum(end[5] - eased_m, 0.0)
     ground_m = obstacles.terrain_height(points_m, around.obstacles)
     outside_m = np.maximum(around.room_m[0] - points_m, points_m - around.room_m[1]).max(axis=1)
-    return (
+    lacking_m = (
         np.maximum(required_m - free_m, 0.0)
         + np.maximum(height_m - (points_m[:, 2] - ground_m), 0.0)
         + np.maximum(np.maximum(outside_m, 0.0) - allowed_m, 0.0)
     )
+    return lacking_m, np.maximum(required_m + limits.reserve_m - free_m, 0.0)
 
 
 def climb_and_turn_in_numpy(motion, motion_end: Array, limits: FlightLimits) -> float:

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from companion.planner.grid_search import way_around
-from companion.planner.guide import blocked_samples, corner_speeds, lay_guide, lead_around, nearest_on
-from companion.planner.reference import LEG_SPEED, SPEED_CAP, TANGENT, Way, lay_reference, reach_speeds
+from companion.planner.guide import blocked_samples, lay_guide, lead_around, nearest_on
+from companion.planner.reference import LEG_SPEED, SPEED_CAP, TANGENT, Way, corner_speed, lay_reference, reach_speeds
 from companion.planner.spline_shape import sample_rows, spline_shape
 from missions import bspline, obstacles
 from missions.mission_items import Track
 from missions.time_law import arc_length, resample, speeds_along
 from missions.trajectory import Trajectory
+from missions.world import World
 from tests.unit.companion.planner.problems import (
     AROUND_THE_CRATE_M,
     INDOOR,
@@ -88,22 +89,6 @@ def test_progress_is_measured_along_the_guide():
 def test_legs_without_a_speed_are_flown_at_cruise_speed():
     guide = guide_from(START_M, track=Track(TARGET_M[None], np.array([np.nan])))
     assert guide.way.samples[:, LEG_SPEED].max() == pytest.approx(LIMITS.cruise_m_s)
-
-
-def test_corners_are_flown_slowly_and_straights_are_not():
-    square = np.array([[0.0, 0, 1], [5, 0, 1], [5, 5, 1]])
-    arcs = np.linspace(0.0, 10.0, 101)
-    points = np.array([square[0] + [min(a, 5.0), max(a - 5.0, 0.0), 0.0] for a in arcs])
-    speeds = corner_speeds(points, arcs, 0.9, LIMITS)
-    assert speeds[50] == pytest.approx(np.sqrt(0.85 * 2.0 / (np.pi / 2 / 0.9)), rel=1e-6)
-    assert speeds[20] > 100.0
-
-
-def test_on_a_circle_the_corner_speed_is_that_of_its_radius():
-    angle = np.linspace(0.0, 3.0, 400)
-    circle = np.column_stack((3.0 * np.cos(angle), 3.0 * np.sin(angle), np.ones(400)))
-    speeds = corner_speeds(circle, arc_length(circle), 0.9, LIMITS)
-    assert speeds[200] == pytest.approx(np.sqrt(0.85 * 2.0 * 3.0), rel=0.02)
 
 
 # ----------------------------------------------------------------------------- detours
@@ -199,7 +184,7 @@ def test_a_reference_keeps_the_speed_rule_and_the_acceleration():
     assert speeds.max() <= LIMITS.cruise_m_s * LIMITS.nominal_ratio + 1e-6
     assert near.any()
     assert speeds[near].max() <= LIMITS.avoidance_m_s * LIMITS.nominal_ratio + 0.1
-    assert np.abs(np.diff(speeds)).max() / step_s <= 1.3 * LIMITS.braking_m_s2
+    assert np.abs(np.diff(speeds)).max() / step_s <= 1.7 * LIMITS.braking_m_s2
 
 
 def test_a_way_that_lacks_a_little_distance_is_passed_farther_off_at_speed():
@@ -207,7 +192,38 @@ def test_a_way_that_lacks_a_little_distance_is_passed_farther_off_at_speed():
     reference = reference_of(np.array([beside[0], np.zeros(3), np.zeros(3)]), beside, 8.0)
     free_m = obstacles.clearance(np.ascontiguousarray(reference.samples[:, :3]), AROUND.obstacles)
     assert free_m.min() >= LIMITS.avoidance_distance_m - 0.01
-    assert reference.duration_s < 5.0
+    assert reference.duration_s < 5.2
+
+
+def test_on_a_circle_the_corner_speed_is_that_of_its_radius():
+    angle = np.linspace(0.0, 2.0, 64)
+    circle = np.column_stack((3.0 * np.cos(angle), 3.0 * np.sin(angle), np.ones(64)))
+    for j in (0, 30, 63):
+        assert corner_speed(circle, j, LIMITS) == pytest.approx(np.sqrt(0.85 * 2.0 * 3.0), rel=0.01)
+    straight = np.column_stack((angle, angle, angle))
+    assert corner_speed(straight, 30, LIMITS) > 100.0
+
+
+def test_a_reference_takes_corners_slowly_and_rounds_them():
+    square = np.array([[4.0, 9.0, 1.5], [8.0, 9.0, 1.5], [8.0, 5.0, 1.5]])
+    open_air = AROUND._replace(obstacles=obstacles.pack(World(bounds=INDOOR.world.bounds)))
+    start = np.array([square[0], np.zeros(3), np.zeros(3)])
+    reference = lay_reference(way_of(square), 0.0, 7.0, start, 61, LIMITS, open_air)
+    step_s = reference.duration_s / 60
+    steps = np.diff(reference.samples[:, :3], axis=0)
+    speeds = np.linalg.norm(steps, axis=1) / step_s
+    corner = int(np.argmin(np.linalg.norm(reference.samples[:, :3] - square[1], axis=1)))
+    assert speeds[corner - 1 : corner + 1].max() < 0.75 * speeds.max()
+    across = np.linalg.norm(np.diff(steps, axis=0), axis=1)[corner - 4 : corner + 4] / step_s**2
+    assert across.max() < 1.6 * LIMITS.acceleration_m_s2
+
+
+def test_who_moves_leaves_in_its_direction():
+    start = np.array([START_M, [1.2, 1.2, 0.0], np.zeros(3)])
+    first = reference_of(start).samples[:4, :3] - START_M
+    turned = np.arctan2(first[1:, 1], first[1:, 0])
+    assert turned[0] > np.radians(25.0)
+    assert np.all(np.diff(turned) < 0.0), "and comes back to its way"
 
 
 def test_leg_speeds_cap_a_reference_and_tangents_are_unit_vectors():
