@@ -186,7 +186,7 @@ class FlightApp:
             stack.callback(self.station.recording.close)
             stack.callback(self._audit.close)
             for url in self.settings.ground_links():
-                connection = await open_link(url, self.station.receive, self.station.say)
+                connection = await open_link(url, self.station.receive, self.station.tell)
                 stack.callback(connection.close)
                 self.station.connections.append(connection)
             stack.push_async_callback(self._end_programs)

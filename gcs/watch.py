@@ -37,7 +37,7 @@ async def watch(settings: FlightSettings, events: EventLog, work_dir: Path, page
         stack.callback(station.recording.close)
         stack.callback(audit.close)
         for url in settings.ground_links():
-            connection = await open_link(url, station.receive, station.say)
+            connection = await open_link(url, station.receive, station.tell)
             stack.callback(connection.close)
             station.connections.append(connection)
             events.add("link", f"listening on {url}")
