@@ -192,7 +192,7 @@ async def test_a_flood_of_datagrams_leaves_everything_else_its_turn():
         await turn
     inward.close()
     assert max(later - earlier for earlier, later in itertools.pairwise(taken)) < 700
-    assert taken[2] < 20
+    assert taken[1] < 20
     assert max(map(len, ground.frames)) == 4096
 
 
