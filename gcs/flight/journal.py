@@ -228,7 +228,7 @@ def read_story(path: Path) -> Story | None:
     for line in lines:
         try:
             record = msgspec.json.decode(line, type=Record)
-        except (msgspec.DecodeError, msgspec.ValidationError):
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             continue  # torn by the crash
         if isinstance(record, Began):
             story = Story(record)
