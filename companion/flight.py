@@ -132,8 +132,8 @@ class Flight:
             self._traffic.want(plan.trajectory, self.order.plan_id, now_s)
         elif plan.trajectory is None:
             self._traffic.note_no_path(plan.request.start.position_m, now_s)
-            settings = self._crew.settings
-            self._retry_at_s = now_s + (settings.conflict_retry_s if self._conflict_s < np.inf else settings.retry_s)
+            settings, urgent = self._crew.settings, self._conflict_s < np.inf or self._new_order is not None
+            self._retry_at_s = now_s + (settings.conflict_retry_s if urgent else settings.retry_s)
             yield instructions.Note("no path found", {"replan_ms": cpu_ms})
         elif late_s > self._crew.lateness_s:
             yield instructions.Note("plan came too late", {"late_s": late_s, "replan_ms": cpu_ms})
@@ -251,23 +251,23 @@ class Flight:
         on_course = self._error_m(now_s) <= self._crew.lost_track_m
         start = self.course.motion(start_s) if on_course else self._estimate(start_s)
         self._asked_order = self._new_order or self.order
-        guide, arc_m = self._guide(start.position_m)
+        guide, arc_m = self._guide(start)
         committed = self.course.trajectory(start_s) if on_course else None
         self._asked_wanted = self._traffic.shall_want(now_s)
         others = self._traffic.before(now_s) if self._asked_wanted else self._traffic.neighbours(now_s)
         self._asked = PlanRequest(self._crew.next_number(), start, start_s, guide, arc_m, committed, others)
         return self._asked
 
-    def _guide(self, from_m: Array) -> tuple[Guide, float]:
+    def _guide(self, start: Motion) -> tuple[Guide, float]:
         """What the next plan follows, and how much of it is done: the track, or a way aside."""
-        lay_guide, aside_m = self._crew.planner.lay_guide, self._traffic.place_aside_m
+        join, aside_m = self._crew.planner.join_track, self._traffic.place_aside_m
         self._asked_aside = self._traffic.makes_way and aside_m is not None
         if self._asked_aside and aside_m is not None:
-            return lay_guide(Track(aside_m[None], np.array([np.nan]), (0,)), 0, from_m), 0.0
+            return join(Track(aside_m[None], np.array([np.nan]), (0,)), 0, start), 0.0
         if self._new_order is not None:
-            return lay_guide(self._new_order.track, 0, from_m), 0.0
+            return join(self._new_order.track, 0, start), 0.0
         if self._left_track_at is not None:
-            return lay_guide(self.order.track, self._left_track_at, from_m), 0.0
+            return join(self.order.track, self._left_track_at, start), 0.0
         return self.course.guide, self.course.arc_m
 
     def _estimate(self, at_s: float) -> Motion:
