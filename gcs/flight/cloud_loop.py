@@ -37,7 +37,7 @@ LOOK_INTERVAL_S = 0.05
 SWAP_TIMEOUT_S = 5.0
 """A companion that has the new mission for so long and does not fly it is said so."""
 ARRIVING_M = 1.5
-"""Who is so near to its last target is not sent anywhere else, in units of its arrival tolerance and more."""
+"""Who is so near to its last target, or within its arrival tolerance where that is more, is not sent elsewhere."""
 SAME_WAY_SHARE = 0.25
 """A vehicle whose new curve stays within this share of the clearance of its old one keeps what it has."""
 
@@ -60,7 +60,6 @@ class CloudLoop:
         observed = self.flight.station.fleet.observed
         observed.bounds = self.flight.mission.world.bounds
         self.replanner = Replanner(self.flight.mission, observed)
-        self._progress: dict[int, int] = {}
 
     def edit(self, mission: Mission) -> None:
         """Fly a changed mission: other obstacles, targets, or fewer vehicles."""
@@ -72,6 +71,8 @@ class CloudLoop:
         if self.flight.mode is not PlanningMode.END_CLOUD:
             return
         self.replanner.mission = self.flight.mission  # its origin may have moved since
+        for vehicle in self.flight.vehicles.values():
+            vehicle.passed_samples = 0  # it may have flown this plan before
         while True:
             aloft = list(self._aloft())
             cause = self.replanner.look(aloft, self._now_s)
@@ -86,7 +87,7 @@ class CloudLoop:
 
     async def _replan(self, cause: Cause, aloft: Sequence[Aloft]) -> None:
         flight, began_s, observed = self.flight, self._now_s, self.replanner.observed
-        changes = observed.changes
+        basis = self.replanner.basis
         flight.events.add("replan", f"planning anew: {cause.value}", cause=cause.name.lower())
         rest = remaining_mission(flight.mission, aloft, (*observed.boxes(), *self._parked(aloft)))
         try:
@@ -95,7 +96,7 @@ class CloudLoop:
             flight.events.add("replan", f"no plan: {problem}", severity=Severity.WARNING)
             self.replanner.put_off(self._now_s)
             return
-        kept = self.replanner.judge(cause, plan, aloft, changes, self._now_s)
+        kept = self.replanner.judge(cause, plan, aloft, basis, self._now_s)
         if kept:
             flight.events.add("replan", f"the plan stays: {kept}", cause=cause.name.lower())
             return
@@ -131,7 +132,6 @@ class CloudLoop:
             return False
         vehicle.change_plan(part)
         vehicle.take_items(items, flight.mission)
-        self._progress.pop(part.sysid, None)
         assert flight.plan is not None
         parts = tuple(part if old.sysid == part.sysid else old for old in flight.plan.vehicles)
         flight.plan = replace(flight.plan, vehicles=parts)
@@ -157,7 +157,8 @@ class CloudLoop:
             position_m = self._position_m(vehicle)
             if position_m is None or vehicle.plan is None or not self._is_under_way(vehicle):
                 continue
-            plan, done = vehicle.plan, self._progressed(vehicle, position_m)
+            plan, reach_m = vehicle.plan, 2.0 * self.flight.mission.onboard.horizon_m
+            done = vehicle.progress(position_m, reach_m)
             targets = tuple(target for target in plan.targets if target.name not in vehicle.monitor.route.passed)
             curve_m = plan.curve_m[done:]
             if len(curve_m) > 1 and lengths(plan.curve_m[-1] - position_m) > self._arriving_m:
@@ -176,16 +177,6 @@ class CloudLoop:
             CompanionState.HOLDING,
             Reason.NO_PATH,
         )
-
-    def _progressed(self, vehicle: VehicleFlight, position_m: np.ndarray) -> int:
-        """Index of the sample of its curve beside which a vehicle is; it does not go back."""
-        assert vehicle.plan is not None
-        curve_m, before = vehicle.plan.curve_m, self._progress.get(vehicle.sysid, 0)
-        step_m = max(vehicle.plan.length_m / (len(curve_m) - 1), 1e-6)
-        window = 2 + round(2.0 * self.flight.mission.onboard.horizon_m / step_m)
-        done = before + int(np.argmin(lengths(curve_m[before : before + window] - position_m)))
-        self._progress[vehicle.sysid] = done
-        return done
 
     def _parked(self, aloft: Sequence[Aloft]) -> Iterator[Box]:
         """Vehicles that are planned for no more, as obstacles that keep the others at the required separation."""

@@ -1,7 +1,6 @@
 """What is done on the ground before a vehicle may be armed: hear it, check it, set it up, store fence and mission."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -10,16 +9,15 @@ from gcs.dialect import AUTOPILOT, mavlink
 from gcs.errors import CommandRefused, PreflightError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions, preflight, safety_parameters, upload
-from gcs.flight.events import EventLog
 from gcs.flight.fence import fence_items
 from gcs.flight.monitor import Phase, describe
+from gcs.flight.operation import Operation
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.link.shaper import fitting_rates
 from gcs.microservices.command_client import CommandClient
 from gcs.microservices.mission_messages import FENCE
 from gcs.planner.plan import VehiclePlan
 from gcs.settings import PlanningMode
-from gcs.station import Station
 from missions.mission import Mission, OnArrival, Site, Vehicle
 from missions.mission_items import Command as ItemCommand
 from missions.mission_items import MissionItem, encode_track, plan_id
@@ -44,23 +42,8 @@ STREAM_RATES_HZ = {
 }
 
 
-@dataclass(frozen=True)
-class Preparation:
-    """How the vehicles of one flight are prepared.
-
-    Args:
-        station: the links and the fleet's state.
-        mission: with its final origin.
-        mode: who plans.
-        events: where everything of note is written.
-        speed: simulated seconds per wall-clock second.
-    """
-
-    station: Station
-    mission: Mission
-    mode: PlanningMode
-    events: EventLog
-    speed: float
+class Preparation(Operation):
+    """How the vehicles of one flight are prepared."""
 
     async def connect(self, vehicle: Vehicle) -> None:
         """Hear a vehicle, and its companion where one is needed, and order its telemetry.

@@ -1,5 +1,6 @@
 """Fence, preflight checks, read-back comparison, safety parameters and the report's arithmetic."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -11,9 +12,12 @@ from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import preflight
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.fence import fence_height_m, fence_items
+from gcs.flight.monitor import VehicleMonitor
 from gcs.flight.report import TRUTH_HEADER, Flown, min_separation_m, read_truth
 from gcs.flight.safety_parameters import requirements
+from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.mission_comparison import first_difference
+from gcs.planner import plan_mission
 from missions.mission import load_mission
 from missions.mission_items import Track, encode_track
 from tests.unit.gcs import messages as mav
@@ -182,3 +186,16 @@ def test_events_are_kept_written_and_told(tmp_path: Path):
         "data": {"attempt": 2},
     }
     assert told == log.events
+
+
+def test_progress_along_a_plan_does_not_go_back_and_begins_anew_with_another_plan():
+    part = plan_mission(INDOOR, seed=1).vehicles[0]
+    monitor = VehicleMonitor(part.target, INDOOR.on_arrival, 0.5, 300.0, True, True, INDOOR.frame, 0.0)
+    flight = VehicleFlight(ALPHA, monitor, part)
+    last = len(part.curve_m) - 1
+    for index in range(0, last + 1, 5):
+        assert flight.progress(part.curve_m[index], reach_m=4.0) == index
+    assert flight.progress(part.curve_m[0], reach_m=4.0) >= last - 5
+    shorter = replace(part, curve_m=part.curve_m[-4:], times_s=part.times_s[-4:])
+    flight.change_plan(shorter)
+    assert flight.progress(shorter.curve_m[1], reach_m=4.0) == 1

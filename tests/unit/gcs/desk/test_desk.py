@@ -54,6 +54,16 @@ async def test_each_phase_has_its_orders_and_the_others_say_why_not(phase: Phase
     assert {intent for intent in orders if desk.why_not(intent, BOTH) is None} == possible
 
 
+async def test_who_holds_already_can_be_told_to_hold_only_while_its_companion_is_about_to_take_over():
+    desk = await make_desk()
+    put(desk, Phase.FLYING)
+    for state in desk.vehicles.values():
+        state.mode = Mode.HOLD
+    assert desk.why_not(Intent.HOLD, BOTH) is None
+    put(desk, Phase.HOVERING)
+    assert desk.why_not(Intent.HOLD, BOTH) == "already in hold"
+
+
 async def test_a_prepared_vehicle_can_be_armed_once_nothing_speaks_against_it():
     desk = await make_desk()
     put(desk, Phase.PREPARED, armed=False)
