@@ -9,6 +9,7 @@ from typing import Any, TextIO
 import msgspec
 
 from gcs.dialect import mavlink
+from gcs.unwritten import Unwritten
 
 BEGAN = "began"
 """The event with which a program's log begins: its `unix_us` tells when that was."""
@@ -52,6 +53,7 @@ class EventLog:
 
     def __post_init__(self) -> None:
         self._started_s = self.clock()
+        self._unwritten = Unwritten("the event log", self.complain)
         self._file: TextIO | None = self.path.open("a" if self.keep else "w", buffering=1) if self.path else None
 
     def add(
@@ -61,13 +63,19 @@ class EventLog:
         event = Event(t_s=t_s, vehicle=vehicle, kind=kind, text=text, severity=severity, data=data)
         self.events.append(event)
         if self._file is not None:
-            self._file.write(msgspec.json.encode(event).decode() + "\n")
+            with self._unwritten:
+                self._file.write(msgspec.json.encode(event).decode() + "\n")
         for listener in self.listeners:
             listener(event)
 
+    def complain(self, text: str) -> None:
+        """A file of the flight can be written no longer."""
+        self.add("disk", text, severity=Severity.ERROR)
+
     def close(self) -> None:
         if self._file is not None:
-            self._file.close()
+            with self._unwritten:
+                self._file.close()
 
 
 def severity_of(mav_severity: int) -> Severity:
