@@ -15,6 +15,10 @@ BEGAN = "began"
 """The event with which a program's log begins: its `unix_us` tells when that was."""
 
 
+MOST_KEPT, KEPT_AFTER = 20_000, 15_000
+"""Events in memory; the file has all of them."""
+
+
 class Severity(Enum):
     """How much an event matters to an operator."""
 
@@ -37,7 +41,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass
 class EventLog:
-    """Keeps events, writes them as JSON lines, and tells listeners.
+    """Keeps the newest events, writes all of them as JSON lines, and tells listeners.
 
     Args:
         clock: seconds on a monotonic clock.
@@ -62,6 +66,8 @@ class EventLog:
         t_s = round(self.clock() - self._started_s, 3)
         event = Event(t_s=t_s, vehicle=vehicle, kind=kind, text=text, severity=severity, data=data)
         self.events.append(event)
+        if len(self.events) > MOST_KEPT:
+            del self.events[:-KEPT_AFTER]
         if self._file is not None:
             with self._unwritten:
                 self._file.write(msgspec.json.encode(event).decode() + "\n")
