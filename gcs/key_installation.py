@@ -46,7 +46,7 @@ async def install_key(ring: KeyRing, sysid: int, link: LinkUrl) -> None:
     """
     station = Station()
     station.codec.signing = signing = ring.signing(station.unix_us)
-    connection = await open_link(link, station.receive, station.say)
+    connection = await open_link(link, station.receive, station.tell)
     station.connections.append(connection)
     heartbeats = asyncio.create_task(station.send_heartbeats())
     try:

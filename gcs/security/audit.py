@@ -17,6 +17,7 @@ from typing import Any
 import msgspec
 
 from gcs.dialect import Message, enum_name
+from gcs.unwritten import Unwritten, unheard
 
 AUDIT_FILE = "audit.jsonl"
 MOST_PENDING = 1000
@@ -144,13 +145,20 @@ class Audit:
 
 
 class AuditFile:
-    """An audit log in a file, which is appended to; each entry is on its way to the disk before its frame is sent."""
+    """An audit log in a file, which is appended to; each entry is on its way to the disk before its frame is sent.
 
-    def __init__(self, path: Path) -> None:
+    Args:
+        path: the file.
+        say: takes a sentence if it can be written no longer; orders go out all the same, since one of them may be Hold.
+    """
+
+    def __init__(self, path: Path, say: Callable[[str], None] = unheard) -> None:
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        self._unwritten = Unwritten("the audit log", say)
 
     def write(self, line: bytes) -> None:
-        os.write(self._descriptor, line)
+        with self._unwritten:
+            os.write(self._descriptor, line)
 
     def close(self) -> None:
         os.close(self._descriptor)

@@ -67,7 +67,6 @@ class Page:
         self._draw_scene()
         self._panels = Panels(server, desk, lambda client: self._aiming.begin(client), self._views())
         self._aiming = Aiming(
-            server,
             desk,
             self._panels.presses,
             lambda: self._panels.selected,
