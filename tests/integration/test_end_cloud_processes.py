@@ -34,7 +34,6 @@ def kinds(directory: Path) -> list[str]:
 def test_an_obstacle_that_no_map_shows_is_seen_avoided_and_planned_around(tmp_path: Path):
     report = flown(tmp_path)
     assert report["cloud_replans"] >= 1
-    assert report["swap_s_p50"] <= 3.0
     assert "swapped" in kinds(tmp_path)
 
 
