@@ -19,6 +19,7 @@ RELATIVE_TOLERANCE = 1e-6
 _LAYOUTS = dict(enumerate("BbHhIiQqfd", start=mavlink.MAV_PARAM_TYPE_UINT8))
 """MAV_PARAM_TYPE -> how `struct` calls it."""
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?", re.ASCII)
+_LARGEST_INTEGER = mavlink.MAV_PARAM_TYPE_INT64
 _NAME = re.compile(r"[A-Za-z0-9_]{1,16}", re.ASCII)
 
 
@@ -31,7 +32,7 @@ class ParameterDifference:
     on_vehicle: Value | None
 
     def __str__(self) -> str:
-        return f"{self.name}: {_shown(self.in_file)} in the file, {_shown(self.on_vehicle)} on the vehicle"
+        return f"{self.name}: {shown_value(self.in_file)} in the file, {shown_value(self.on_vehicle)} on the vehicle"
 
 
 def read_parameters(text: str, name: str = "parameters") -> dict[str, Parameter]:
@@ -94,9 +95,22 @@ def _value(text: str, kind: int) -> Value:
         raise ValueError
     layout = _LAYOUTS[kind]
     value: Value = float(text) if layout in "fd" else int(text)
-    struct.pack(layout, value)
+    struct.pack(f"<{layout}", value)
     return value
 
 
-def _shown(value: Value | None) -> str:
+def read_value(text: str) -> Value:
+    """A number as an operator gives it.
+
+    Raises:
+        ParameterError: it is none; NaN and infinity are not, since autopilots store them and fail of them.
+    """
+    try:
+        return _value(text, mavlink.MAV_PARAM_TYPE_REAL32 if "." in text or "e" in text.lower() else _LARGEST_INTEGER)
+    except (ValueError, struct.error, OverflowError):
+        raise ParameterError(f"expected a number, found {text[:40]!r}") from None
+
+
+def shown_value(value: Value | None) -> str:
+    """As an operator reads it."""
     return "none" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -17,7 +17,7 @@ from gcs.microservices.verified_upload import VerifiedUpload
 from gcs.station import Station
 from sitl.microservices.outbox import Link
 from sitl.simulator import Simulator
-from tests.benchmarks.link.conversation import waypoints
+from tests.benchmarks.link.conditions import waypoints
 from tests.fuzz import file_targets
 from tests.fuzz.target import Target
 from tests.fuzz.traffic import Traffic
