@@ -95,19 +95,23 @@ class Page:
         self._seen = sightings(self._desk)
         if len(self._seen) > fleet_before:
             self._frame_fleet()
-        with self._server.atomic():
+        with self._server.atomic():  # around everything: what it sends is packed by another thread, from its end on
             self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + (TELL_OF_MANY_S if len(self._seen) > MANY else TELL_INTERVAL_S)
-                self._desk.observe(shown_s)
-                self._seating.update()
-                self._show_plan()
-                self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
-                self._panels.update(self._seen, shown_s)
-        places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
-        tags = self._tags if len(self._tags) == len(places_m) else []
-        self._browsers.update(self._seen, tags, places_m[: len(tags)])
+                self._tell(shown_s)
+            places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
+            tags = self._tags if len(self._tags) == len(places_m) else []
+            self._browsers.update(self._seen, tags, places_m[: len(tags)])
+
+    def _tell(self, shown_s: float) -> None:
+        """Bring up to date what is read, not watched."""
+        self._desk.observe(shown_s)
+        self._seating.update()
+        self._show_plan()
+        self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
+        self._panels.update(self._seen, shown_s)
 
     def _is_another(self, mission: Mission | None) -> bool:
         """Whether a mission is drawn elsewise than the one that is shown; a moved origin changes nothing."""
