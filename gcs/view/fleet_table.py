@@ -30,6 +30,7 @@ HEADINGS = (
     "Replan",
     "Heard",
     "Link",
+    "Signed",
 )
 
 EMPTY = f"<td>{NOTHING}</td>"
@@ -58,6 +59,7 @@ class Row:
     replan_ms: float = math.nan
     heard: tuple[str, Tone] = (NOTHING, Tone.QUIET)
     quality: float = math.nan
+    trust: tuple[str, Tone] = (NOTHING, Tone.QUIET)
 
 
 def rows(desk: Desk, seen: Iterable[Sighting], selected: set[int], now_s: float) -> list[Row]:
@@ -104,6 +106,7 @@ def _row(
         replan_ms=status.replan_p50_ms if status is not None and status.replans else math.nan,
         heard=words.age_words(now_s - state.telemetry_s),
         quality=outlook.link_quality if outlook is not None else math.nan,
+        trust=words.trust_words(desk.station.codec.signing.trust(sysid)),
     )
 
 
@@ -131,6 +134,7 @@ def _render_row(row: Row) -> str:
             _number(row.replan_ms, "ms"),
             _words(*row.heard),
             _words(*words.quality_words(row.quality)),
+            _words(*row.trust),
             "</tr>",
         )
     )

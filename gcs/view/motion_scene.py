@@ -12,7 +12,7 @@ import viser
 
 from gcs.desk import Desk
 from gcs.flight.trails import Trails
-from gcs.view.colours import Rgb, faded, vivid
+from gcs.view.colours import Rgb, vivid
 from gcs.view.lines import (
     AHEAD,
     CHUNK,
@@ -26,14 +26,15 @@ from gcs.view.lines import (
 )
 from gcs.view.sightings import Sighting
 from gcs.view.theme import DARK, Theme
+from gcs.view.vehicle_scene import MANY
 
 Array = npt.NDArray[np.float64]
 
 TRAIL_PX, AHEAD_PX = 2.5, 5.0
 TOLERANCE_SHARE = 0.5
 """By how much a thinned trail may be off, of its points' spacing."""
-MANY, SLOWER = 30, 2
-"""In a fleet with more vehicles than this, what lies ahead is sent at every second update."""
+SLOWER = 2
+"""In a large fleet, what lies ahead is sent at every second update."""
 
 
 class MotionScene:
@@ -89,10 +90,10 @@ class MotionScene:
             handle.remove()
         self._sealed, self._lines, self._batch_sent = {}, SealedLines(), True
         self._drawn, self._past = [sighting.sysid for sighting in seen], FleetTrails(len(seen), self._spacing_m)
-        self._colours = [faded(vivid(sighting.colour), self._theme.shade, 0.2) for sighting in seen]
+        self._colours = [self._theme.line_behind(vivid(sighting.colour)) for sighting in seen]
         self._tails = self._live("/fleet/tails", CHUNK, self._colours, TRAIL_PX)
         self._ahead = self._live(
-            "/fleet/ahead", AHEAD, [faded(vivid(s.colour), self._theme.ahead, 0.2) for s in seen], AHEAD_PX
+            "/fleet/ahead", AHEAD, [self._theme.line_ahead(vivid(s.colour)) for s in seen], AHEAD_PX
         )
         self._batch = self._line("/trails/newest", self._lines.batch, self._lines.colours, visible=False)
 
