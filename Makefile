@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes fuzz bench-view screenshots check format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes fuzz bench-view screenshots check docs dist check-dist format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -74,6 +74,22 @@ bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK a
 SECONDS ?= 60
 fuzz: $(VENV)/.installed-dev  ## hostile traffic on all receive paths: make fuzz SECONDS=60
 	$(BIN)/python -m tests.fuzz --seconds $(SECONDS)
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(PIP) -e '.[docs]'
+	@touch $@
+
+docs: $(VENV)/.installed-docs  ## the documentation as a site, in out/site; a broken link fails
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet -f .mkdocs.yml
+	@echo "out/site/index.html"
+
+dist: $(VENV)/.installed-dev  ## wheel and source archive, in dist
+	$(BIN)/python -m build --outdir dist
+
+check-dist: dist  ## the wheel in a virtual environment of its own, outside of this folder: it flies the indoor mission
+	rm -rf out/wheel && $(PYTHON) -m venv out/wheel/venv
+	out/wheel/venv/bin/pip install --quiet --disable-pip-version-check -c constraints.txt dist/*.whl
+	cd out/wheel && venv/bin/gcs fly indoor --sim --headless --speed 5 --report flight
 
 check: $(VENV)/.installed-dev  ## the fast checks: format, lint, types, import contracts
 	$(BIN)/ruff format --check .

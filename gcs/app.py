@@ -30,6 +30,7 @@ from gcs.programs import FlightPrograms
 from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
 from gcs.settings import Autopilots, FlightSettings, OriginHere, PlanningMode
 from gcs.station import Station
+from gcs.unwritten import Unwritten
 from missions.errors import MissionError
 from missions.frames import GeodeticPoint
 from missions.mission import Mission
@@ -77,12 +78,12 @@ class FlightApp:
     ) -> None:
         self.settings, self.work_dir, self.events = settings, work_dir, events
         self._planner, self._page = planner, page
-        self._journal = _journal(work_dir)
+        self._journal = _journal(work_dir, events)
         self.station = Station(
-            recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None),
+            recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None, say=events.complain),
             say=lambda text: events.add("link", text, severity=Severity.WARNING),
         )
-        self._audit = AuditFile(work_dir / AUDIT_FILE)
+        self._audit = AuditFile(work_dir / AUDIT_FILE, events.complain)
         self.station.audit = Audit(self._audit.write, self.station.unix_us)
         self.programs = self._new_programs(mission, settings.mission, work_dir)
         self.flight = self._new_flight(mission, settings.mode)
@@ -162,7 +163,7 @@ class FlightApp:
     def _new_programs(self, mission: Mission, source: str, log_dir: Path) -> FlightPrograms:
         """The programs of a mission, and the keys with which its vehicles sign."""
         keys = key_ring(self.settings, mission, log_dir, self.events)
-        self.station.codec.signing = keys.signing(self.station.unix_us)
+        self.station.codec.signing = keys.signing(self.station.unix_us, self.events.complain)
         names = {vehicle.sysid: vehicle.name for vehicle in mission.vehicles}
         self._security = SecurityWatch(self.station, self.events, names)
         return FlightPrograms(self.settings, source, self.events, log_dir, keys.keys_path)
@@ -184,7 +185,7 @@ class FlightApp:
             stack.callback(self.station.recording.close)
             stack.callback(self._audit.close)
             for url in self.settings.ground_links():
-                connection = await open_link(url, self.station.receive, self.station.say)
+                connection = await open_link(url, self.station.receive, self.station.tell)
                 stack.callback(connection.close)
                 self.station.connections.append(connection)
             stack.push_async_callback(self._end_programs)
@@ -319,14 +320,16 @@ class FlightApp:
             if self.flight.finished and self.report is None:
                 flown = self._flown()
                 self.report = self._judge(flown, "")
-                await asyncio.to_thread(write_picture, self.programs.log_dir, self.flight, flown)  # takes a second
+                with Unwritten("the flight's picture", self.events.complain):  # drawing takes a second
+                    await asyncio.to_thread(write_picture, self.programs.log_dir, self.flight, flown)
                 self.events.add("ended", f"{'success' if self.report.success else 'failed'}: {self.report.reason}")
 
     def _write_report(self, reason: str) -> FlightReport:
         """Write `report.json` and `flight.png`."""
         flown = self._flown()
         report = self._judge(flown, reason)
-        write_picture(self.programs.log_dir, self.flight, flown)
+        with Unwritten("the flight's picture", self.events.complain):
+            write_picture(self.programs.log_dir, self.flight, flown)
         return report
 
     def _judge(self, flown: dict[int, Flown], reason: str) -> FlightReport:
@@ -350,9 +353,9 @@ async def _is_set(event: asyncio.Event, timeout_s: float) -> bool:
     return event.is_set()
 
 
-def _journal(work_dir: Path) -> JournalKeeper:
+def _journal(work_dir: Path, events: EventLog) -> JournalKeeper:
     try:
-        return JournalKeeper(work_dir / JOURNAL_FILE)
+        return JournalKeeper(work_dir / JOURNAL_FILE, events.complain)
     except BlockingIOError:
         raise UsageError(f"{work_dir}: another ground station is flying with this folder") from None
 

@@ -10,7 +10,9 @@ from gcs.commands.convert import convert
 from gcs.commands.experiment import experiment
 from gcs.commands.fly import fly
 from gcs.commands.key import app as key_app
+from gcs.commands.links import links
 from gcs.commands.options import MissionArgument
+from gcs.commands.params import app as params_app
 from gcs.commands.plan import plan
 from gcs.commands.replay import replay
 from gcs.commands.watch import watch
@@ -79,6 +81,8 @@ def missions() -> None:
 
 app.command()(convert)
 app.command()(replay)
+app.command()(links)
+app.add_typer(params_app, name="params")
 app.add_typer(key_app, name="key")
 
 

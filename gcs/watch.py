@@ -24,20 +24,20 @@ async def watch(settings: FlightSettings, events: EventLog, work_dir: Path, page
     Raises:
         UsageError: a port in use, or a key ring that cannot be used.
     """
-    audit = AuditFile(work_dir / AUDIT_FILE)
+    audit = AuditFile(work_dir / AUDIT_FILE, events.complain)
     station = Station(
-        recording=TlogWriter(work_dir / "flight.tlog"),
+        recording=TlogWriter(work_dir / "flight.tlog", say=events.complain),
         say=lambda text: events.add("link", text, severity=Severity.WARNING),
     )
     station.audit = Audit(audit.write, station.unix_us)
-    station.codec.signing = KeyRing(settings.key_folder()).signing(station.unix_us)
+    station.codec.signing = KeyRing(settings.key_folder()).signing(station.unix_us, events.complain)
     desk = Desk(station, events)
     async with AsyncExitStack() as stack:
         assert station.recording is not None
         stack.callback(station.recording.close)
         stack.callback(audit.close)
         for url in settings.ground_links():
-            connection = await open_link(url, station.receive, station.say)
+            connection = await open_link(url, station.receive, station.tell)
             stack.callback(connection.close)
             station.connections.append(connection)
             events.add("link", f"listening on {url}")

@@ -1,7 +1,7 @@
 """The cloud's half of the loop in flight: looks at what was seen, plans anew, and swaps missions without a pause.
 
-The decisions are `gcs.replanning`'s; here they meet the planner and the links. A swap is an upload that is read back,
-and then the companion's word that it flies the new plan; the companion names the current item.
+The decisions are `gcs.replanning`'s; here they meet the planner and the links. A swap is an upload, and the companion's
+word that it flies the new plan; until that comes, the upload is read back. The companion names the current item.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
 from missions.errors import MissionError
 from missions.mission import Mission
-from missions.mission_items import plan_id
+from missions.mission_items import MissionItem, plan_id
 from missions.tunnel import CompanionState, Reason
 from missions.world import Box
 
@@ -125,8 +125,7 @@ class CloudLoop:
         flight, vehicle = self.flight, self.flight.vehicles[part.sysid]
         items = mission_items(part, flight.mission, flight.mode, vehicle.monitor.ground_offset_m)
         try:
-            await upload.swap(flight.station, part.sysid, items)
-            await self._confirmed(vehicle, plan_id(items))
+            await self._hand_over(vehicle, items)
         except GcsError as problem:
             flight.events.add("swap failed", str(problem), vehicle.name, Severity.WARNING)
             return False
@@ -140,14 +139,34 @@ class CloudLoop:
         flight.events.add("swapped", f"flies the new plan after {took_s:.2f} s", vehicle.name, plan_id=plan_id(items))
         return True
 
-    async def _confirmed(self, vehicle: VehicleFlight, expected: int) -> None:
+    async def _hand_over(self, vehicle: VehicleFlight, items: tuple[MissionItem, ...]) -> None:
+        """Store a mission on a vehicle; over when its companion flies it.
+
+        The companion names a plan by what it has read itself: its word is worth as much as reading the mission back,
+        and on a slow link it is there a good while earlier.
+        """
+        storing = asyncio.ensure_future(upload.swap(self.flight.station, vehicle.sysid, items))
+        flying = asyncio.ensure_future(self._flies(vehicle, plan_id(items)))
+        try:
+            await asyncio.wait((storing, flying), return_when=asyncio.FIRST_COMPLETED)
+            if not flying.done():
+                storing.result()
+                await asyncio.wait((flying,), timeout=SWAP_TIMEOUT_S / self.flight.speed)
+            if not flying.done():
+                raise LinkLost(f"vehicle {vehicle.sysid} does not say that it flies the new plan")
+        finally:
+            storing.cancel()
+            flying.cancel()
+            await asyncio.gather(storing, flying, return_exceptions=True)
+
+    async def _flies(self, vehicle: VehicleFlight, expected: int) -> None:
+        """Return when the companion says that it flies a plan."""
         companion = self.flight.state(vehicle.sysid).companion
 
         def flies_it() -> bool:
             return companion.status is not None and companion.status.plan_id == expected
 
-        if not await self.flight.station.holds_within(flies_it, SWAP_TIMEOUT_S / self.flight.speed):
-            raise LinkLost(f"vehicle {vehicle.sysid} does not say that it flies the new plan")
+        await self.flight.station.holds_within(flies_it, float("inf"))
 
     # ------------------------------------------------------------------ where the vehicles are
 

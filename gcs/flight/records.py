@@ -8,6 +8,7 @@ from gcs.flight.picture import draw_flight
 from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
 from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trails
+from gcs.unwritten import Unwritten
 
 
 def read_flown(truth_path: Path | None, trails: Trails) -> dict[int, Flown]:
@@ -23,7 +24,8 @@ def write_report(
     """Judge a flight that took `wall_s` seconds of wall clock, and write `report.json`."""
     ends_s = [float(part.times_s[-1]) for part in flown.values() if len(part.times_s)]
     report = make_report(flight, flown, reason=reason, wall_s=wall_s, sim_s=max(ends_s, default=0.0))
-    (folder / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
+    with Unwritten("the report", flight.events.complain):
+        (folder / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
     return report
 
 

@@ -10,9 +10,7 @@ import numpy.typing as npt
 from gcs.mapping.observed_map import ObservedMap
 from gcs.planner.plan import FleetPlan
 from gcs.replanning.remaining import Aloft
-from missions import obstacles
 from missions.mission import Mission
-from missions.world import World
 
 Array = npt.NDArray[np.float64]
 
@@ -76,8 +74,7 @@ class Replanner:
 
     def __post_init__(self) -> None:
         self._planned = self._before = Basis(changes=0, edits=0)  # of the plan that is flown, and of the one before it
-        self._packed = obstacles.pack(World(bounds=self.mission.world.bounds))
-        self._packed_changes = 0
+        self._clear_in: tuple[Basis, int] | None = None
 
     def edit(self, mission: Mission) -> None:
         """The operator has changed what is flown: the next look has a cause."""
@@ -97,9 +94,18 @@ class Replanner:
             return Cause.EDITED
         if self.observed.changes == self._planned.changes:
             return None
-        if any(self.is_blocked(vehicle.curve_m) for vehicle in aloft):
+        if self._is_any_blocked(aloft):
             return Cause.BLOCKED
         return Cause.REVIEW if now_s >= self._review_s else None
+
+    def _is_any_blocked(self, aloft: Sequence[Aloft]) -> bool:
+        """What is left of somebody's curve is blocked; it is looked at once for each state of plan and map."""
+        state = self._planned, self.observed.changes
+        if self._clear_in == state:
+            return False  # what is left has only become less
+        blocked = any(self.is_blocked(vehicle.curve_m) for vehicle in aloft)
+        self._clear_in = None if blocked else state
+        return blocked
 
     def is_blocked(self, curve_m: Array) -> bool:
         """A curve of (m, 3) ENU samples comes too near to what was seen.
@@ -109,7 +115,7 @@ class Replanner:
         if not len(curve_m):
             return False
         required_m = max(self.mission.limits.clearance_m - self.observed.voxel_m, self.mission.limits.body_radius_m)
-        return float(obstacles.clearance(curve_m, self._seen()).min()) < required_m
+        return float(self.observed.clearance(curve_m).min()) < required_m
 
     def judge(self, cause: Cause, plan: FleetPlan, aloft: Sequence[Aloft], basis: Basis, now_s: float) -> str:
         """Why a new plan is not flown, as a phrase; empty if it is.
@@ -145,9 +151,3 @@ class Replanner:
         then_takes_s = max(float(part.times_s[-1]) for part in plan.vehicles)
         saved_s = now_takes_s - then_takes_s
         return saved_s > max(self.settings.better_s, self.settings.better_share * now_takes_s)
-
-    def _seen(self) -> obstacles.Obstacles:
-        if self._packed_changes != self.observed.changes:
-            self._packed = obstacles.pack(World(bounds=self.mission.world.bounds, boxes=self.observed.boxes()))
-            self._packed_changes = self.observed.changes
-        return self._packed

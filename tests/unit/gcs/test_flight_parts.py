@@ -10,7 +10,7 @@ import pytest
 from gcs.dialect import mavlink
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import preflight
-from gcs.flight.events import EventLog, Severity
+from gcs.flight.events import KEPT_AFTER, MOST_KEPT, EventLog, Severity
 from gcs.flight.fence import fence_height_m, fence_items
 from gcs.flight.monitor import VehicleMonitor
 from gcs.flight.report import TRUTH_HEADER, Flown, min_separation_m, read_truth
@@ -186,6 +186,14 @@ def test_events_are_kept_written_and_told(tmp_path: Path):
         "data": {"attempt": 2},
     }
     assert told == log.events
+
+
+def test_the_newest_events_are_kept_in_memory():
+    log = EventLog(lambda: 0.0)
+    for number in range(50_000):
+        log.add("said", f"text {number}")
+    assert KEPT_AFTER <= len(log.events) <= MOST_KEPT
+    assert log.events[-1].text == "text 49999"
 
 
 def test_progress_along_a_plan_does_not_go_back_and_begins_anew_with_another_plan():

@@ -10,8 +10,9 @@ from gcs.dialect import Mode
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight.events import Event, Severity
 from gcs.flight.monitor import Phase
+from gcs.link.paths import SystemPaths
 from gcs.security.signing import VehicleKey
-from gcs.view import event_list, fleet_table, mission_card, words
+from gcs.view import event_list, fleet_table, link_table, mission_card, words
 from gcs.view.colours import Tone
 from gcs.view.sightings import sightings
 from missions.tunnel import CompanionState, CompanionStatus, Reason
@@ -176,6 +177,19 @@ def test_a_live_link_stands_still_and_an_old_one_warns():
     assert words.age_words(2.0) == ("2 s", Tone.WARN)
     assert words.age_words(12.0) == ("12 s", Tone.BAD)
     assert words.age_words(math.inf) == (words.NOTHING, Tone.QUIET)
+
+
+async def test_the_table_of_links_tells_how_a_vehicle_is_reached():
+    desk = await make_desk(heard=(1,))
+    text = Outline(link_table.render(desk, desk.station.now_s)).text
+    assert text == f"{' '.join(link_table.HEADINGS)} alpha live – – – unsigned 0 0 0 bravo – – – – – – – –"
+    paths: SystemPaths = desk.station.routes._systems.setdefault(1, SystemPaths())
+    path = paths.path(("a link", ("127.0.0.1", 1)))
+    path.hear(1, desk.station.now_s)
+    path.round_trip_s = 0.0843
+    paths.choose(desk.station.now_s)
+    text = Outline(link_table.render(desk, desk.station.now_s)).text
+    assert "alpha live – 84 ms 1 unsigned" in text
 
 
 # ---------------------------------------------------------------- mission

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import viser
 
+from gcs.desk import Desk
 from gcs.dialect import Mode
-from gcs.flight.events import Severity
+from gcs.flight.events import EventLog, Severity
 from gcs.flight.trails import Trails
 from gcs.station import Station
 from gcs.view import page as page_module
@@ -162,6 +163,13 @@ async def test_without_a_mission_vehicles_are_drawn_once_there_is_a_frame(
     scripted.desk.trails = trails
     shown.fly(0.5)
     assert len(node(browser, "/fleet/hull").batched_positions) == 2
+
+
+async def test_a_page_waits_for_the_first_vehicle(server: viser.ViserServer):
+    desk = Desk(Station(), EventLog(lambda: 0.0))
+    for now_s in (0.0, 1.0, 2.0):
+        desk.observations.histories.record(now_s, {})
+    Page(server, desk).update(3.0)
 
 
 async def test_a_moved_origin_begins_the_trails_anew(server: viser.ViserServer, indoor: ScriptedDesk):
