@@ -87,6 +87,7 @@ class CloudLoop:
         if self.flight.mode is not PlanningMode.END_CLOUD:
             return
         self.replanner.mission = self.flight.mission  # its origin may have moved since
+        self._unconfirmed.clear()
         for vehicle in self.flight.vehicles.values():
             vehicle.passed_samples = 0  # it may have flown this plan before
         while True:
