@@ -61,8 +61,8 @@ check-px4: install  ## fly the whole sequence on an autopilot that is there: mak
 bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)
 
-experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10
-	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS)
+experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10 [OUTPUT=docs/results]
+	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS) $(if $(OUTPUT),--output $(OUTPUT))
 
 bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, alone (50 seeds are asked for) and in fleets: make bench-onboard SEEDS=0:10 [BENCH=--quick]
 	@alone=0; $(BIN)/python -m tests.benchmarks.onboard --seeds $(SEEDS) $(BENCH) || alone=1; \

@@ -64,9 +64,9 @@ def scenario(world: Difference, link: Link, seed: int) -> Scenario:
     truth = mission
     match world:
         case Difference.MISSING:
-            truth = _with(mission, cylinders=(*mission.world.cylinders, _in_the_way(mission, rng)))
+            truth = _with(mission, cylinders=(*mission.world.cylinders, _in_the_way(mission, seed, rng)))
         case Difference.MOVED:
-            truth = _with(mission, cylinders=(_in_the_way(_with(mission, cylinders=()), rng),))
+            truth = _with(mission, cylinders=(_in_the_way(mission, seed, rng),))
         case Difference.DEAD_END:
             mission = _in_the_hall(mission)
             truth = _with(mission, boxes=_blind_alley(rng))
@@ -88,9 +88,9 @@ def _jittered(mission: Mission, rng: np.random.Generator) -> Mission:
             return moved
 
 
-def _in_the_way(mission: Mission, rng: np.random.Generator) -> Cylinder:
+def _in_the_way(mission: Mission, seed: int, rng: np.random.Generator) -> Cylinder:
     """A pillar on the curve that the cloud plans for one of the vehicles, clear of everything that is mapped."""
-    plan, solid = plan_mission(mission, seed=0), obstacles.pack(mission.world)
+    plan, solid = plan_mission(mission, seed=seed), obstacles.pack(mission.world)
     curve_m = plan.vehicles[int(rng.integers(len(plan.vehicles)))].curve_m
     places_m = curve_m[int(0.3 * len(curve_m)) : int(0.75 * len(curve_m))]
     free_m = obstacles.clearance(places_m, solid)

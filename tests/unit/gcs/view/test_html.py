@@ -11,11 +11,13 @@ from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight.events import Event, Severity
 from gcs.flight.monitor import Phase
 from gcs.link.paths import SystemPaths
+from gcs.security.signing import VehicleKey
 from gcs.view import event_list, fleet_table, link_table, mission_card, words
 from gcs.view.colours import Tone
 from gcs.view.sightings import sightings
 from missions.tunnel import CompanionState, CompanionStatus, Reason
 from tests.browser.scripted_plan import scripted_progress
+from tests.unit.gcs import messages as mav
 from tests.unit.gcs.view.desks import make_desk
 
 NASTY = "<img src=x onerror=alert(1)> & \"quoted\" 'too'"
@@ -108,8 +110,27 @@ async def test_a_row_tells_mode_phase_numbers_and_companion():
     assert row.to_target_m == pytest.approx(math.dist((1.0, 6.5, 0.0), (19.0, 8.5, 1.5)), abs=1e-2)
     assert row.companion == ("flying", Tone.GOOD)
     text = Outline(fleet_table.render([row])).text
-    assert "alpha Offboard flying 71 % 0.0 m 5.0 m/s – 18.2 m 0 % 0:06 flying 1.4 ms live –" in text
+    assert "alpha Offboard flying 71 % 0.0 m 5.0 m/s – 18.2 m 0 % 0:06 flying 1.4 ms live – no" in text
     assert 'tr class="selected"' in fleet_table.render([row])
+
+
+async def test_a_vehicle_that_is_not_ready_says_why_in_its_autopilots_words():
+    desk = await make_desk()
+    desk.vehicles[1].fold(mav.system_status(ready=False), desk.station.now_s)
+    desk.vehicles[1].fold(mav.status_text("Preflight Fail: ekf2 missing data", severity=3), desk.station.now_s)
+    unready, ready = await table_of(desk)
+    assert (unready.phase, unready.reason) == (("not ready", Tone.WARN), "Preflight Fail: ekf2 missing data")
+    assert ready.phase[0] == "waiting"
+    desk.vehicles[1].fold(mav.system_status(ready=True), desk.station.now_s)
+    assert (await table_of(desk))[0].phase[0] == "waiting"
+
+
+async def test_a_row_tells_whether_its_vehicle_signs():
+    desk = await make_desk()
+    assert [row.trust for row in await table_of(desk)] == [("no", Tone.WARN)] * 2
+    desk.station.codec.signing.vehicles[1] = VehicleKey(next_key=bytes(32))
+    alpha, bravo = await table_of(desk)
+    assert (alpha.trust, bravo.trust) == (("key pending", Tone.WARN), ("no", Tone.WARN))
 
 
 def test_a_large_fleet_stands_closer():
