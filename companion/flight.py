@@ -14,7 +14,7 @@ from companion.events import Odometry
 from companion.instructions import Instruction
 from companion.planner.guide import Guide
 from companion.planner.planner import Plan, PlanRequest
-from companion.setpoints import Heading, Setpoint
+from companion.setpoints import Heading, Setpoint, within_speed
 from companion.traffic import Traffic
 from missions.frames import AutopilotFrame
 from missions.mission_items import Track
@@ -30,6 +30,8 @@ HOVER_LONGER_S = 0.2
 """A vehicle whose first plan has to be announced hovers until then, and for so long if the plan is withdrawn."""
 BRAKES_EARLIER_S = 0.3
 """A collision with another vehicle is braked for so much before it has to be; until then it is planned around."""
+CATCHING_UP_SHARE = 0.97
+"""Of the mission's speed: what an autopilot may aim at to catch up; the rest is for its overshoot."""
 BLIND = {Reason.NO_POSITION, Reason.NO_SENSOR}
 """Whoever does not know where it is, or what is around, makes no plans."""
 
@@ -132,8 +134,8 @@ class Flight:
             self._traffic.want(plan.trajectory, self.order.plan_id, now_s)
         elif plan.trajectory is None:
             self._traffic.note_no_path(plan.request.start.position_m, now_s)
-            settings = self._crew.settings
-            self._retry_at_s = now_s + (settings.conflict_retry_s if self._conflict_s < np.inf else settings.retry_s)
+            settings, urgent = self._crew.settings, self._conflict_s < np.inf or self._new_order is not None
+            self._retry_at_s = now_s + (settings.conflict_retry_s if urgent else settings.retry_s)
             yield instructions.Note("no path found", {"replan_ms": cpu_ms})
         elif late_s > self._crew.lateness_s:
             yield instructions.Note("plan came too late", {"late_s": late_s, "replan_ms": cpu_ms})
@@ -169,7 +171,9 @@ class Flight:
         ahead = self.course.motion_ned(used_s + self._crew.settings.response_lead_s)
         yaw_rad = self._heading.follow(motion.velocity_m_s, now_s - self._last_s)
         self._last_s = now_s
-        return Setpoint(motion.position_m, ahead.velocity_m_s, ahead.acceleration_m_s2, yaw_rad)
+        setpoint = Setpoint(motion.position_m, ahead.velocity_m_s, ahead.acceleration_m_s2, yaw_rad)
+        estimate_m = self._odometry.position_m + (used_s - self._odometry.time_s) * self._odometry.velocity_m_s
+        return within_speed(setpoint, estimate_m, CATCHING_UP_SHARE * self._crew.mission.limits.cruise_speed_m_s)
 
     def _announcement(self, trajectory: Trajectory, kind: TrajectoryKind) -> instructions.SendTrajectory:
         """What is told to the others about a trajectory; its time is vehicle time still."""
@@ -249,23 +253,23 @@ class Flight:
         on_course = self._error_m(now_s) <= self._crew.lost_track_m
         start = self.course.motion(start_s) if on_course else self._estimate(start_s)
         self._asked_order = self._new_order or self.order
-        guide, arc_m = self._guide(start.position_m)
+        guide, arc_m = self._guide(start)
         committed = self.course.trajectory(start_s) if on_course else None
         self._asked_wanted = self._traffic.shall_want(now_s)
         others = self._traffic.before(now_s) if self._asked_wanted else self._traffic.neighbours(now_s)
         self._asked = PlanRequest(self._crew.next_number(), start, start_s, guide, arc_m, committed, others)
         return self._asked
 
-    def _guide(self, from_m: Array) -> tuple[Guide, float]:
+    def _guide(self, start: Motion) -> tuple[Guide, float]:
         """What the next plan follows, and how much of it is done: the track, or a way aside."""
-        lay_guide, aside_m = self._crew.planner.lay_guide, self._traffic.place_aside_m
+        join, aside_m = self._crew.planner.join_track, self._traffic.place_aside_m
         self._asked_aside = self._traffic.makes_way and aside_m is not None
         if self._asked_aside and aside_m is not None:
-            return lay_guide(Track(aside_m[None], np.array([np.nan]), (0,)), 0, from_m), 0.0
+            return join(Track(aside_m[None], np.array([np.nan]), (0,)), 0, start), 0.0
         if self._new_order is not None:
-            return lay_guide(self._new_order.track, 0, from_m), 0.0
+            return join(self._new_order.track, 0, start), 0.0
         if self._left_track_at is not None:
-            return lay_guide(self.order.track, self._left_track_at, from_m), 0.0
+            return join(self.order.track, self._left_track_at, start), 0.0
         return self.course.guide, self.course.arc_m
 
     def _estimate(self, at_s: float) -> Motion:

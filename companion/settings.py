@@ -70,7 +70,7 @@ class PilotSettings:
     retry_s: float = 0.3
     """Between a failed plan and the next attempt ..."""
     conflict_retry_s: float = 0.1
-    """... where the committed trajectory meets something."""
+    """... where the committed trajectory meets something, or leads elsewhere than the newest order."""
     planning_allowance_wall_s: float = 0.06
     """A plan begins this much in the future: search and thread switches fit in (wall clock)."""
     lateness_wall_s: float = 0.06

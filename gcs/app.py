@@ -7,31 +7,30 @@ from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from pathlib import Path
 
-import msgspec
-
 from gcs.desk import Desk
 from gcs.desk.desk import PlannerChoice
 from gcs.desk.intents import NewMission
-from gcs.errors import GcsError, KeyRingError, ProcessFailed, UsageError
+from gcs.errors import GcsError, ProcessFailed, UsageError
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.journal import JOURNAL_FILE, JournalKeeper, Story
-from gcs.flight.picture import draw_flight
 from gcs.flight.preflight import origin_here
 from gcs.flight.preparation import CONNECT_TIMEOUT_S
+from gcs.flight.records import read_flown, write_picture, write_report
 from gcs.flight.rejoining import rejoin
-from gcs.flight.report import FlightReport, Flown, flown_from_trail, make_report, read_truth
+from gcs.flight.report import FlightReport, Flown
 from gcs.flight.security_watch import SecurityWatch
 from gcs.flight.sequence import FleetFlight, Planner
 from gcs.flight.trails import Trails
+from gcs.flight_keys import key_ring
 from gcs.link.opening import open_link
 from gcs.link.simulator_control import ControlPort
 from gcs.link.tlog import TlogWriter
 from gcs.processes import Child, Processes
 from gcs.programs import FlightPrograms
 from gcs.security.audit import AUDIT_FILE, Audit, AuditFile
-from gcs.security.key_ring import KeyRing
 from gcs.settings import Autopilots, FlightSettings, OriginHere, PlanningMode
 from gcs.station import Station
+from gcs.unwritten import Unwritten
 from missions.errors import MissionError
 from missions.frames import GeodeticPoint
 from missions.mission import Mission
@@ -79,12 +78,12 @@ class FlightApp:
     ) -> None:
         self.settings, self.work_dir, self.events = settings, work_dir, events
         self._planner, self._page = planner, page
-        self._journal = _journal(work_dir)
+        self._journal = _journal(work_dir, events)
         self.station = Station(
-            recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None),
+            recording=TlogWriter(work_dir / "flight.tlog", keep=story is not None, say=events.complain),
             say=lambda text: events.add("link", text, severity=Severity.WARNING),
         )
-        self._audit = AuditFile(work_dir / AUDIT_FILE)
+        self._audit = AuditFile(work_dir / AUDIT_FILE, events.complain)
         self.station.audit = Audit(self._audit.write, self.station.unix_us)
         self.programs = self._new_programs(mission, settings.mission, work_dir)
         self.flight = self._new_flight(mission, settings.mode)
@@ -164,7 +163,7 @@ class FlightApp:
     def _new_programs(self, mission: Mission, source: str, log_dir: Path) -> FlightPrograms:
         """The programs of a mission, and the keys with which its vehicles sign."""
         keys = key_ring(self.settings, mission, log_dir, self.events)
-        self.station.codec.signing = keys.signing(self.station.unix_us)
+        self.station.codec.signing = keys.signing(self.station.unix_us, self.events.complain)
         names = {vehicle.sysid: vehicle.name for vehicle in mission.vehicles}
         self._security = SecurityWatch(self.station, self.events, names)
         return FlightPrograms(self.settings, source, self.events, log_dir, keys.keys_path)
@@ -186,7 +185,7 @@ class FlightApp:
             stack.callback(self.station.recording.close)
             stack.callback(self._audit.close)
             for url in self.settings.ground_links():
-                connection = await open_link(url, self.station.receive, self.station.say)
+                connection = await open_link(url, self.station.receive, self.station.tell)
                 stack.callback(connection.close)
                 self.station.connections.append(connection)
             stack.push_async_callback(self._end_programs)
@@ -321,39 +320,29 @@ class FlightApp:
             if self.flight.finished and self.report is None:
                 flown = self._flown()
                 self.report = self._judge(flown, "")
-                await asyncio.to_thread(self._draw, flown)  # takes a second, in which the page goes on
+                with Unwritten("the flight's picture", self.events.complain):  # drawing takes a second
+                    await asyncio.to_thread(write_picture, self.programs.log_dir, self.flight, flown)
                 self.events.add("ended", f"{'success' if self.report.success else 'failed'}: {self.report.reason}")
 
     def _write_report(self, reason: str) -> FlightReport:
         """Write `report.json` and `flight.png`."""
         flown = self._flown()
         report = self._judge(flown, reason)
-        self._draw(flown)
+        with Unwritten("the flight's picture", self.events.complain):
+            write_picture(self.programs.log_dir, self.flight, flown)
         return report
 
     def _judge(self, flown: dict[int, Flown], reason: str) -> FlightReport:
-        """Write `report.json`."""
-        ends_s = [float(part.times_s[-1]) for part in flown.values() if len(part.times_s)]
+        """Write `report.json`, and the flight's end into the journal."""
         wall_s = time.monotonic() - self._started_s
-        report = make_report(self.flight, flown, reason=reason, wall_s=wall_s, sim_s=max(ends_s, default=0.0))
-        written = msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n"
-        (self.programs.log_dir / "report.json").write_bytes(written)
+        report = write_report(self.programs.log_dir, self.flight, flown, reason=reason, wall_s=wall_s)
         self._journal.look(self.flight, self.station.unix_us())
         self._journal.end(report.success, self.station.unix_us())
         return report
 
-    def _draw(self, flown: dict[int, Flown]) -> None:
-        """Write `flight.png`; it knows no event loop, so that a thread may do it."""
-        names = {vehicle.sysid: vehicle.name for vehicle in self.flight.mission.vehicles}
-        tracks = {names[sysid]: part.in_flight().positions_m for sysid, part in flown.items() if sysid in names}
-        draw_flight(self.programs.log_dir / "flight.png", self.flight.mission, self.flight.plan, tracks)
-
     def _flown(self) -> dict[int, Flown]:
-        truth = self.programs.truth_path
-        if self._simulated and truth.exists():
-            return read_truth(truth)
         assert self.desk.trails is not None
-        return {sysid: flown_from_trail(trail) for sysid, trail in self.desk.trails.by_sysid.items()}
+        return read_flown(self.programs.truth_path if self._simulated else None, self.desk.trails)
 
 
 async def _is_set(event: asyncio.Event, timeout_s: float) -> bool:
@@ -364,30 +353,9 @@ async def _is_set(event: asyncio.Event, timeout_s: float) -> bool:
     return event.is_set()
 
 
-def key_ring(settings: FlightSettings, mission: Mission, work_dir: Path, events: EventLog) -> KeyRing:
-    """The keys of a flight. Simulated vehicles are given theirs: they are made here when they are needed first.
-
-    Raises:
-        KeyRingError: keys of real vehicles cannot be used; simulated ones get keys for this flight alone.
-    """
-    ring = KeyRing(settings.key_folder())
-    if settings.autopilots is not Autopilots.SIMULATED:
-        return ring
-    sysids = [vehicle.sysid for vehicle in mission.vehicles]
+def _journal(work_dir: Path, events: EventLog) -> JournalKeeper:
     try:
-        ring.ensure(sysids)
-    except KeyRingError as problem:
-        if settings.keys is not None:
-            raise
-        events.add("security", f"{problem}; this flight has keys of its own", severity=Severity.WARNING)
-        ring = KeyRing(work_dir / "keys")
-        ring.ensure(sysids)
-    return ring
-
-
-def _journal(work_dir: Path) -> JournalKeeper:
-    try:
-        return JournalKeeper(work_dir / JOURNAL_FILE)
+        return JournalKeeper(work_dir / JOURNAL_FILE, events.complain)
     except BlockingIOError:
         raise UsageError(f"{work_dir}: another ground station is flying with this folder") from None
 

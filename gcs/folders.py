@@ -17,6 +17,16 @@ def flights_folder() -> Path:
     return _base("XDG_STATE_HOME", ".local/state") / NAME / "flights"
 
 
+def orders_file() -> Path:
+    """The audit log of orders that were given outside of any flight."""
+    return _base("XDG_STATE_HOME", ".local/state") / NAME / "orders.jsonl"
+
+
+def kept_parameters_file(sysid: int) -> Path:
+    """What a vehicle's parameters were the last time they were fetched."""
+    return _base("XDG_CACHE_HOME", ".cache") / NAME / f"parameters-{sysid}.json"
+
+
 def new_flight_folder(name: str, began: datetime) -> Path:
     """Make a folder for one flight, named after when it began.
 

@@ -4,18 +4,14 @@ MAVLink has no answer to SETUP_SIGNING: the vehicle has its key when it signs wi
 disk before it is first sent, so that whatever is lost on the way the vehicle is never alone in knowing it.
 """
 
-import asyncio
-import contextlib
-
+from gcs.attachment import attached, heard_vehicle
 from gcs.dialect import AUTOPILOT, mavlink
 from gcs.errors import LinkLost, UsageError
-from gcs.link.opening import open_link
 from gcs.link.url import LinkUrl
 from gcs.security.key_ring import KeyRing, new_key
 from gcs.security.signing import Signing, Trust, VehicleKey
 from gcs.station import Station
 
-HEARD_TIMEOUT_S = 15.0
 REPEAT_S = 0.5
 ATTEMPTS = 12
 
@@ -44,21 +40,9 @@ async def install_key(ring: KeyRing, sysid: int, link: LinkUrl) -> None:
         LinkLost: it was not heard, or it does not sign; the key stays pending.
         UsageError: the link cannot be opened.
     """
-    station = Station()
-    station.codec.signing = signing = ring.signing(station.unix_us)
-    connection = await open_link(link, station.receive, station.say)
-    station.connections.append(connection)
-    heartbeats = asyncio.create_task(station.send_heartbeats())
-    try:
-        await station.wait_until(
-            lambda: sysid in station.fleet.vehicles, HEARD_TIMEOUT_S, f"vehicle {sysid} not heard on {link}"
-        )
-        await _send_until_signed(station, signing, sysid)
-    finally:
-        heartbeats.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await heartbeats
-        connection.close()
+    async with attached([link], ring, print) as station:
+        await heard_vehicle(station, sysid)
+        await _send_until_signed(station, station.codec.signing, sysid)
 
 
 async def _send_until_signed(station: Station, signing: Signing, sysid: int) -> None:

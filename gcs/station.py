@@ -13,6 +13,7 @@ from gcs.dialect import AUTOPILOT, Message, mavlink
 from gcs.errors import AmbiguousVehicle, LinkLost
 from gcs.exchange import Exchange
 from gcs.fleet.fleet import Fleet
+from gcs.fleet.flood_gate import FloodGate
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.link.codec import Codec
 from gcs.link.connection import Address, Connection
@@ -25,6 +26,8 @@ from gcs.microservices.mission_messages import LinkEstimate
 from gcs.security.audit import Audit
 
 HEARTBEAT_INTERVAL_S = 1.0
+MOST_NOTICES, NOTICES_WINDOW_S = 20, 10.0
+"""Sentences about the links; of more at once the rest is counted."""
 BULK = frozenset({"MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_SET", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST"})
 """What gives way to everything else where a link's budget is short."""
 
@@ -60,7 +63,8 @@ class Station:
     say: Callable[[str], None] = lambda text: None
 
     def __post_init__(self) -> None:
-        self.routes = Routes((self.codec.system, self.codec.component), lambda text: self.say(text))
+        self.routes = Routes((self.codec.system, self.codec.component), self.tell)
+        self._gate, self._untold = FloodGate(MOST_NOTICES, NOTICES_WINDOW_S), 0
         self._exchanges: dict[tuple[int, int], list[Exchange]] = defaultdict(list)
         self._turns: dict[tuple[tuple[int, int], str], asyncio.Lock] = {}
         self._shapers: dict[Connection, Shaper] = {}
@@ -156,7 +160,17 @@ class Station:
         """Know no vehicle any more: others will come in their place."""
         self.fleet.vehicles.clear()
         self.codec.sources.clear()
-        self.routes = Routes((self.codec.system, self.codec.component), lambda text: self.say(text))
+        self.routes = Routes((self.codec.system, self.codec.component), self.tell)
+
+    def tell(self, text: str) -> None:
+        """Say a sentence about links to the operator, unless there are too many at once."""
+        if not self._gate.admits(self.now_s):
+            self._untold += 1
+            return
+        if self._untold:
+            self.say(f"{self._untold} more sentences about the links were left out")
+            self._untold = 0
+        self.say(text)
 
     def vehicle(self, sysid: int) -> VehicleState:
         """The state of a vehicle that has been heard.

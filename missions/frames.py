@@ -43,10 +43,11 @@ def parse_origin(text: str) -> GeodeticPoint:
         >>> parse_origin("47.4,8.5,490").altitude_amsl_m
         490.0
     """
+    names, parts = ("latitude_deg", "longitude_deg", "altitude_amsl_m"), text.split(",")
     try:
-        latitude_deg, longitude_deg, altitude_amsl_m = (float(part) for part in text.split(","))
-        place = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg, "altitude_amsl_m": altitude_amsl_m}
-        return msgspec.convert(place, GeodeticPoint)
+        if len(parts) != len(names):
+            raise ValueError(f"{len(parts)} value{'s' * (len(parts) > 1)} found")
+        return msgspec.convert({name: float(part) for name, part in zip(names, parts, strict=True)}, GeodeticPoint)
     except (ValueError, msgspec.ValidationError) as wrong:
         raise MissionError(f"--origin {text}: expected LAT,LON,ALT such as 47.3977,8.5456,489.4 ({wrong})") from None
 

@@ -61,13 +61,16 @@ def centres_of(voxels: IntArray, voxel_m: float) -> Array:
 
 def blocks_of(voxels: IntArray) -> dict[BlockIndex, BoolArray]:
     """(n, 3) voxel indices sorted into blocks: index -> (8, 8, 8) occupied."""
-    blocks: dict[BlockIndex, BoolArray] = {}
-    for index, inside in zip((voxels // BLOCK_VOXELS).tolist(), (voxels % BLOCK_VOXELS).tolist(), strict=True):
-        occupied = blocks.get(tuple(index))
-        if occupied is None:
-            occupied = blocks[tuple(index)] = np.zeros((BLOCK_VOXELS,) * 3, np.bool_)
-        occupied[tuple(inside)] = True
-    return blocks
+    if len(voxels) == 0:
+        return {}
+    blocks, inside = np.divmod(voxels, BLOCK_VOXELS)
+    low = blocks.min(axis=0)
+    _, size_north, size_up = blocks.max(axis=0) - low + 1
+    east, north, up = (blocks - low).T
+    _, firsts, which = np.unique((east * size_north + north) * size_up + up, return_index=True, return_inverse=True)
+    occupied = np.zeros((len(firsts), *(BLOCK_VOXELS,) * 3), np.bool_)
+    occupied[which, inside[:, 0], inside[:, 1], inside[:, 2]] = True
+    return {(e, n, u): block for (e, n, u), block in zip(blocks[firsts].tolist(), occupied, strict=True)}
 
 
 def encode_block(block: OccupancyBlock) -> bytes:

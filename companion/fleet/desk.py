@@ -74,7 +74,8 @@ class FleetDesk:
 
     def speak(self, frame: AutopilotFrame | None, now_s: float) -> None:
         """Say what is due; positions once it is known where the autopilot's frame lies."""
-        for report in self.exchange.tick(self._place(frame), now_s):
+        place = self._place(frame) if self.exchange.is_position_due(now_s) else None
+        for report in self.exchange.tick(place, now_s):
             datagram = self._frames.pack(report)
             if datagram is not None:
                 self._send(datagram)

@@ -118,6 +118,10 @@ class Exchange:
         """Nothing is flown any more that others could rely on."""
         self._flown = self._offered = self._wanted = None
 
+    def is_position_due(self, now_s: float) -> bool:
+        """The vehicle's position is to be said with the next tick."""
+        return now_s >= self._position_due_s
+
     def tick(self, place: PositionReport | None, now_s: float) -> list[Report]:
         """What is to be said now, in UTC."""
         reports: list[Report] = []
@@ -127,7 +131,7 @@ class Exchange:
                     reports.append(PlanReport(self.sysid, self._in_utc(told.message, now_s + self.utc_ahead_s)))
                     told.copies += 1
                     told.due_s = now_s + self._interval_s(told, now_s)
-        if place is not None and now_s >= self._position_due_s:
+        if place is not None and self.is_position_due(now_s):
             self._position_due_s = now_s + self.settings.position_interval_s
             utc_s = None if self.utc_ahead_s is None else place.utc_s
             reports.append(replace(place, utc_s=utc_s))

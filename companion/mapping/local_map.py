@@ -104,7 +104,8 @@ class LocalMap:
         Ask it in the thread that observes.
         """
         grid = self._grid
-        voxels = np.argwhere(grid.strength >= CERTAIN)
+        flat = np.flatnonzero(grid.strength.ravel() >= CERTAIN)  # many times faster than an argwhere of three axes
+        voxels = np.column_stack(np.unravel_index(flat, grid.strength.shape))
         centres_m = grid.low_m + (voxels + 0.5) * grid.voxel_m
         return centres_m, grid.low_m, grid.low_m + self._size * grid.voxel_m
 

@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from companion.planner.grid_search import straighten, way_around
 from companion.planner.limits import FlightLimits, Surroundings, ends_of, free_space, lacking
-from companion.planner.reference import LEG_SPEED, Way
+from companion.planner.reference import CORNER_SHARE, LEG_SPEED, Way
 from missions.kernels import compiled
 from missions.mission_items import Track
 from missions.time_law import arc_length, resample
+from missions.trajectory import Motion
 
 Array = npt.NDArray[np.float64]
 
@@ -25,9 +26,17 @@ JOIN_AHEAD = 1.0
 """Who is beside the track joins it this multiple of the distance ahead."""
 NEARLY_AS_NEAR_M = 0.3
 """Of several places on the track that are about as near, the earliest is joined."""
+CORNER_REACH = 4.0
+"""Corners are rounded within so many corridor widths to both sides."""
+RUN_OUT_SHARE = 1.4
+"""Who flies another way runs out on the old course for so many times what braking and rounding the corner take."""
+GENTLE_TURN = 2.0
+"""A corner that could be flown so many times as fast needs no run-out."""
 MAX_DETOURS = 20
 MERGED_M = 1e-3
 """Points nearer to each other are one."""
+STANDING_M_S = 0.15
+"""Slower than this a vehicle can go anywhere."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +80,9 @@ class Guide:
         return self.first_index + min(passed, len(self.track_arc_m) - 1)
 
 
-def lay_guide(track: Track, index: int, from_m: Array, horizon_m: float, limits: FlightLimits) -> Guide:
+def lay_guide(
+    track: Track, index: int, from_m: Array, horizon_m: float, limits: FlightLimits, over_m: Array | None = None
+) -> Guide:
     """The guide from a place along what remains of a track.
 
     Args:
@@ -80,14 +91,44 @@ def lay_guide(track: Track, index: int, from_m: Array, horizon_m: float, limits:
         from_m: (3,) where the guide begins, ENU [m].
         horizon_m: sets how dense the guide is.
         limits: speeds and corridor.
+        over_m: (3,) where it passes before it joins the track, see `run_out`.
     """
-    first, points, legs = _remaining(track, index, from_m, limits)
+    lead_in_m = from_m[None] if over_m is None else np.vstack((from_m, over_m))
+    first, points, legs = _remaining(track, index, lead_in_m[-1], limits)
     legs = np.where(np.isnan(legs), limits.cruise_m_s, legs)
-    vertices = np.vstack((from_m, points))
-    legs = np.concatenate((legs[:1], legs))
+    vertices = np.vstack((lead_in_m, points))
+    legs = np.concatenate((np.repeat(legs[:1], len(lead_in_m)), legs))
     way = _dense(vertices, legs, limits.corridor_m, horizon_m / SAMPLES_PER_HORIZON)
     n_track_points = len(track.points_m) - first
     return Guide(way, arc_length(vertices)[-n_track_points:], first)
+
+
+def run_out(track: Track, index: int, start: Motion, limits: FlightLimits) -> Array | None:
+    """(3,) how far a vehicle goes on as it moves before it turns towards a track; None where it can turn at once.
+
+    A guide that begins with a sharp corner at speed cannot be flown; with this place on it, it can.
+
+    Args:
+        track: the whole track.
+        index: of the track point that is flown to.
+        start: the state from which the track is joined, ENU.
+        limits: of acceleration, and the corridor in which corners are rounded.
+    """
+    place_m, velocity_m_s, acceleration_m_s2 = start
+    speed_m_s = float(np.linalg.norm(velocity_m_s))
+    if speed_m_s < STANDING_M_S:
+        return None
+    onwards_m = _remaining(track, index, place_m, limits)[1][0] - place_m
+    ahead, reach_m = velocity_m_s / speed_m_s, CORNER_REACH * limits.corridor_m
+    onwards_m = onwards_m / max(float(np.linalg.norm(onwards_m)), MERGED_M)
+    corner_m = place_m + reach_m * np.array([-ahead, np.zeros(3), onwards_m])
+    corner_m_s = corner_speeds(corner_m, reach_m * np.arange(3.0), reach_m, limits)[1]
+    settling_s = 0.5 * limits.acceleration_m_s2 / limits.jerk_m_s3
+    fastest_m_s = speed_m_s + settling_s * max(float(acceleration_m_s2 @ ahead), 0.0)
+    if corner_m_s >= GENTLE_TURN * fastest_m_s:
+        return None
+    braking_m = max(fastest_m_s**2 - corner_m_s**2, 0.0) / (2.0 * limits.braking_m_s2)
+    return place_m + RUN_OUT_SHARE * (braking_m + reach_m) * ahead
 
 
 def lead_around(
@@ -213,6 +254,18 @@ def _dense(vertices: Array, legs_m_s: Array, corridor_m: float, spacing_m: float
     points = resample(vertices, corners, arcs)
     leg = np.minimum(np.searchsorted(corners, arcs, side="left"), len(vertices) - 1)
     return Way(np.column_stack((points, legs_m_s[leg], np.full(len(arcs), corridor_m))), arcs)
+
+
+def corner_speeds(points_m: Array, arc_m: Array, reach_m: float, limits: FlightLimits) -> Array:
+    """(m,) speeds [m/s] at which a polyline's turns, rounded within `reach_m` to both sides, can be flown."""
+    behind = resample(points_m, arc_m, np.maximum(arc_m - reach_m, 0.0))
+    ahead = resample(points_m, arc_m, np.minimum(arc_m + reach_m, arc_m[-1]))
+    to_here, onwards = points_m - behind, ahead - points_m
+    across = np.linalg.norm(np.cross(to_here, onwards), axis=1)
+    angle = np.arctan2(across, np.einsum("ij,ij->i", to_here, onwards))
+    length_m = 0.5 * (np.linalg.norm(to_here, axis=1) + np.linalg.norm(onwards, axis=1))
+    curvature = angle / np.maximum(length_m, 1e-6)
+    return np.sqrt(CORNER_SHARE * limits.acceleration_m_s2 / np.maximum(curvature, 1e-6))
 
 
 def _with_detour(

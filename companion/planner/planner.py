@@ -12,7 +12,7 @@ from companion.mapping.sorting import Known
 from companion.planner.braking import brake_along
 from companion.planner.dominance import objective_weights
 from companion.planner.evaluation import HARD
-from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around
+from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around, run_out
 from companion.planner.limits import Surroundings, flight_limits, free_space, surroundings
 from companion.planner.local_plan import Horizon, LocalPlanner, plan_along, warm_way
 from companion.planner.mopso import search_plan
@@ -136,6 +136,13 @@ class Planner:
     def lay_guide(self, track: Track, index: int, from_m: Array) -> Guide:
         """The guide from a place along the rest of a track, not yet led around anything."""
         return lay_guide(track, index, from_m, self.horizon_m, self.limits)
+
+    def join_track(self, track: Track, index: int, start: Motion) -> Guide:
+        """The guide from a state of motion along the rest of a track: who cannot turn at once runs out a little."""
+        over_m = run_out(track, index, start, self.limits)
+        if over_m is not None and not self.may_rest(over_m[None])[0]:
+            over_m = None
+        return lay_guide(track, index, start.position_m, self.horizon_m, self.limits, over_m)
 
     def observe(self, scan: Scan, neighbours: tuple[Neighbour, ...] = ()) -> None:
         """Take a scan into the map. One thread at a time may plan or observe; `is_clear` may be asked by another.

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from gcs.commands.options import PortOption
 from gcs.errors import UsageError
 from gcs.replay.player import GREATEST_SPEED, LEAST_SPEED
 
@@ -16,7 +17,7 @@ def replay(
     ],
     speed: Annotated[float, typer.Option(help="recorded seconds per second")] = 1.0,
     seek: Annotated[float, typer.Option(metavar="S", help="where to begin, in seconds")] = 0.0,
-    port: Annotated[int, typer.Option(min=1, max=65535, help="port of the web page")] = 8080,
+    port: PortOption = 8080,
 ) -> None:
     """Show a recorded flight in the web page: nothing is sent to anybody.
 

@@ -20,6 +20,8 @@ from gcs.desk.orderly import carry_out
 from gcs.desk.orders import Order, OrderBook, OrderState, outcome_of
 from gcs.desk.seat import CommandSeat
 from gcs.errors import GcsError
+from gcs.fleet.flood_gate import FloodGate
+from gcs.fleet.status_texts import URGENT, StatusText
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight.events import EventLog, Severity, severity_of
 from gcs.flight.sequence import FleetFlight
@@ -34,6 +36,8 @@ from missions.errors import MissionError
 from missions.faults import SimulatorFault
 from missions.mission import Mission
 
+MOST_QUOTED, QUOTED_WINDOW_S = 100, 10.0
+"""What all vehicles together may say in a while, beside what is urgent: somebody may make up many of them."""
 REPEATED_S = 10.0
 """A vehicle that says the same again within this time is not quoted again [s]."""
 
@@ -96,6 +100,7 @@ class Desk:
         self._watcher: asyncio.Task[None] | None = None
         self._texts_heard_s: dict[int, float] = {}
         self._quoted_s: dict[tuple[int, str], float] = {}
+        self._gates = {urgent: FloodGate(MOST_QUOTED, QUOTED_WINDOW_S) for urgent in (True, False)}
 
     @property
     def mission(self) -> Mission | None:
@@ -137,11 +142,15 @@ class Desk:
             for said in [text for text in state.texts if text.time_s > heard_s]:
                 self._texts_heard_s[sysid] = said.time_s
                 if said.time_s - self._quoted_s.get((sysid, said.text), -math.inf) > REPEATED_S:
-                    self._quoted_s[sysid, said.text] = said.time_s
-                    self.events.add("said", said.text, self.name(sysid), severity_of(said.severity))
+                    self._quote(sysid, said)
         old = [key for key, quoted_s in self._quoted_s.items() if self.station.now_s - quoted_s > REPEATED_S]
         for key in old:
             del self._quoted_s[key]
+
+    def _quote(self, sysid: int, said: StatusText) -> None:
+        self._quoted_s[sysid, said.text] = said.time_s
+        if self._gates[said.severity <= URGENT].admits(self.station.now_s):
+            self.events.add("said", said.text, self.name(sysid), severity_of(said.severity))
 
     def observe(self, now_s: float) -> None:
         """Bring up to date what is watched over time; call it often."""

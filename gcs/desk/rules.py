@@ -127,4 +127,11 @@ def _why_not_in_flight(intent: Intent, state: VehicleState, part: VehicleFlight 
         return None if state.airborne else "not in the air"
     if intent is Intent.SPEED and state.mode not in _AUTO_MODES:
         return "its companion keeps the mission's speeds" if state.mode is Mode.OFFBOARD else "not in an auto mode"
+    if intent is Intent.HOLD and _about_to_fly(part):
+        return None
     return f"already in {state.mode.name.lower()}" if MODES.get(intent) is state.mode else None
+
+
+def _about_to_fly(part: VehicleFlight | None) -> bool:
+    """Its mission is started; it may hold still, but only until its companion has taken over."""
+    return part is not None and part.monitor.phase is Phase.FLYING and not part.monitor.paused_by_operator

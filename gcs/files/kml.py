@@ -40,6 +40,8 @@ def parse_kml(data: bytes, name: str) -> tuple[PlanDocument, list[str]]:
         parser.Parse(data, True)
     except expat.ExpatError as wrong:
         raise BadFile(name, f"line {wrong.lineno}", f"expected KML, found {expat.ErrorString(wrong.code)}") from None
+    except (LookupError, ValueError) as wrong:  # of Python's codecs
+        raise BadFile(name, "line 1", f"expected UTF-8, found another encoding ({wrong})") from None
     if not reader.is_kml:
         raise BadFile(name, "", "expected a kml element")
     return PlanDocument(polygons=tuple(reader.polygons)), reader.notes

@@ -1,9 +1,9 @@
 """STATUSTEXT into lines: chunks put together, repetitions left out, floods held back. No clock: time is an argument."""
 
-from collections import deque
 from dataclasses import dataclass, field
 
-from gcs.dialect import Message
+from gcs.dialect import Message, mavlink
+from gcs.fleet.flood_gate import FloodGate
 
 CHUNK_CHARACTERS = 50
 """A full chunk; a shorter one is the last of its text."""
@@ -13,8 +13,10 @@ CHUNKS_WAIT_S = 1.0
 SAME_WITHIN_S = 5.0
 """A text that is said again within so long is not shown again."""
 MOST_PER_WINDOW, WINDOW_S = 20, 2.0
+URGENT = mavlink.MAV_SEVERITY_CRITICAL
 MOST_REMEMBERED = 64
 MISSING = "[…]"
+UNPRINTABLE = "\ufffd"
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,10 @@ class _Chunks:
     @property
     def text(self) -> str:
         end = max(self.parts) if self.last is None else self.last
-        text = "".join(self.parts.get(seq, MISSING) for seq in range(end + 1))
-        return text if self.last is not None else text + MISSING
+        told = [self.parts.get(seq, MISSING) for seq in range(end + 1)] + [MISSING] * (self.last is None)
+        return "".join(
+            part for before, part in zip(["", *told], told, strict=False) if part != MISSING or before != part
+        )
 
 
 @dataclass
@@ -51,11 +55,17 @@ class StatusTexts:
 
     repeated: int = 0
     """Texts left out because they had just been shown."""
-    held_back: int = 0
-    """Texts left out because there were too many at once."""
     _chunks: dict[int, _Chunks] = field(default_factory=dict)
     _shown_s: dict[tuple[int, str], float] = field(default_factory=dict)
-    _recent_s: deque[float] = field(default_factory=lambda: deque(maxlen=MOST_PER_WINDOW))
+    _gates: dict[bool, FloodGate] = field(
+        default_factory=lambda: {urgent: FloodGate(MOST_PER_WINDOW, WINDOW_S) for urgent in (True, False)}
+    )
+    """Chatter must not keep an emergency from being shown."""
+
+    @property
+    def held_back(self) -> int:
+        """Texts left out because there were too many at once."""
+        return sum(gate.held_back for gate in self._gates.values())
 
     def receive(self, message: Message, now_s: float) -> list[StatusText]:
         """The lines that are complete with this message."""
@@ -82,7 +92,7 @@ class StatusTexts:
         return self._show(chunks.severity, chunks.text, now_s)
 
     def _show(self, severity: int, text: str, now_s: float) -> list[StatusText]:
-        said = (severity, text.rstrip("\t\x00 "))
+        said = (severity, printable(text.rstrip("\t\x00 ")))
         before_s = self._shown_s.pop(said, None)
         self._shown_s[said] = now_s
         while len(self._shown_s) > MOST_REMEMBERED:
@@ -90,8 +100,9 @@ class StatusTexts:
         if before_s is not None and now_s - before_s < SAME_WITHIN_S:
             self.repeated += 1
             return []
-        if len(self._recent_s) == MOST_PER_WINDOW and now_s - self._recent_s[0] < WINDOW_S:
-            self.held_back += 1
-            return []
-        self._recent_s.append(now_s)
-        return [StatusText(now_s, *said)]
+        return [StatusText(now_s, *said)] if self._gates[severity <= URGENT].admits(now_s) else []
+
+
+def printable(text: str) -> str:
+    """What may be shown of a text from outside: what would steer a terminal or turn the writing around is replaced."""
+    return "".join(character if character.isprintable() else UNPRINTABLE for character in text)

@@ -1,7 +1,7 @@
 """The cloud's half of the loop in flight: looks at what was seen, plans anew, and swaps missions without a pause.
 
-The decisions are `gcs.replanning`'s; here they meet the planner and the links. A swap is an upload that is read back,
-and then the companion's word that it flies the new plan; the companion names the current item.
+The decisions are `gcs.replanning`'s; here they meet the planner and the links. A swap is an upload, and the companion's
+word that it flies the new plan; until that comes, the upload is read back. The companion names the current item.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
 from missions.errors import MissionError
 from missions.mission import Mission
-from missions.mission_items import plan_id
+from missions.mission_items import MissionItem, plan_id
 from missions.tunnel import CompanionState, Reason
 from missions.world import Box
 
@@ -36,10 +36,25 @@ LOOK_INTERVAL_S = 0.05
 """In vehicle time, as all that follows."""
 SWAP_TIMEOUT_S = 5.0
 """A companion that has the new mission for so long and does not fly it is said so."""
+HAND_OVER_TIMEOUT_S = 15.0
+"""A mission that could not be stored within this time was made for places that the vehicles have long left."""
 ARRIVING_M = 1.5
-"""Who is so near to its last target is not sent anywhere else, in units of its arrival tolerance and more."""
+"""Who is so near to its last target, or within its arrival tolerance where that is more, is not sent elsewhere."""
 SAME_WAY_SHARE = 0.25
 """A vehicle whose new curve stays within this share of the clearance of its old one keeps what it has."""
+
+
+@dataclass(frozen=True)
+class NewPlan:
+    """One vehicle's part of a new plan, as it is sent.
+
+    Args:
+        part: of the plan.
+        items: the mission that it becomes.
+    """
+
+    part: VehiclePlan
+    items: tuple[MissionItem, ...]
 
 
 @dataclass
@@ -60,7 +75,7 @@ class CloudLoop:
         observed = self.flight.station.fleet.observed
         observed.bounds = self.flight.mission.world.bounds
         self.replanner = Replanner(self.flight.mission, observed)
-        self._progress: dict[int, int] = {}
+        self._unconfirmed: dict[int, dict[int, NewPlan]] = {}
 
     def edit(self, mission: Mission) -> None:
         """Fly a changed mission: other obstacles, targets, or fewer vehicles."""
@@ -72,10 +87,14 @@ class CloudLoop:
         if self.flight.mode is not PlanningMode.END_CLOUD:
             return
         self.replanner.mission = self.flight.mission  # its origin may have moved since
+        self._unconfirmed.clear()
+        for vehicle in self.flight.vehicles.values():
+            vehicle.passed_samples = 0  # it may have flown this plan before
         while True:
+            self._reconcile()
             aloft = list(self._aloft())
             cause = self.replanner.look(aloft, self._now_s)
-            if cause is not None:
+            if cause is not None and self._can_be_told(aloft):
                 with acting_as(Origin.REPLANNER):
                     await self._replan(cause, aloft)
             await asyncio.sleep(LOOK_INTERVAL_S / self.flight.speed)
@@ -86,7 +105,7 @@ class CloudLoop:
 
     async def _replan(self, cause: Cause, aloft: Sequence[Aloft]) -> None:
         flight, began_s, observed = self.flight, self._now_s, self.replanner.observed
-        changes = observed.changes
+        basis = self.replanner.basis
         flight.events.add("replan", f"planning anew: {cause.value}", cause=cause.name.lower())
         rest = remaining_mission(flight.mission, aloft, (*observed.boxes(), *self._parked(aloft)))
         try:
@@ -95,7 +114,7 @@ class CloudLoop:
             flight.events.add("replan", f"no plan: {problem}", severity=Severity.WARNING)
             self.replanner.put_off(self._now_s)
             return
-        kept = self.replanner.judge(cause, plan, aloft, changes, self._now_s)
+        kept = self.replanner.judge(cause, plan, aloft, basis, self._now_s)
         if kept:
             flight.events.add("replan", f"the plan stays: {kept}", cause=cause.name.lower())
             return
@@ -123,31 +142,75 @@ class CloudLoop:
         """Give one vehicle its new mission; False where it may still fly the old one."""
         flight, vehicle = self.flight, self.flight.vehicles[part.sysid]
         items = mission_items(part, flight.mission, flight.mode, vehicle.monitor.ground_offset_m)
+        new = NewPlan(part, items)
         try:
-            await upload.swap(flight.station, part.sysid, items)
-            await self._confirmed(vehicle, plan_id(items))
+            await self._hand_over(vehicle, items)
         except GcsError as problem:
             flight.events.add("swap failed", str(problem), vehicle.name, Severity.WARNING)
+            self._unconfirmed.setdefault(part.sysid, {})[plan_id(items)] = new
             return False
-        vehicle.change_plan(part)
-        vehicle.take_items(items, flight.mission)
-        self._progress.pop(part.sysid, None)
-        assert flight.plan is not None
-        parts = tuple(part if old.sysid == part.sysid else old for old in flight.plan.vehicles)
-        flight.plan = replace(flight.plan, vehicles=parts)
+        self._take(vehicle, new)
         took_s = self._now_s - began_s
         self.swaps_s.append(took_s)
         flight.events.add("swapped", f"flies the new plan after {took_s:.2f} s", vehicle.name, plan_id=plan_id(items))
         return True
 
-    async def _confirmed(self, vehicle: VehicleFlight, expected: int) -> None:
+    def _take(self, vehicle: VehicleFlight, new: NewPlan) -> None:
+        """This is what a vehicle flies from now on."""
+        flight = self.flight
+        vehicle.change_plan(new.part)
+        vehicle.take_items(new.items, flight.mission)
+        assert flight.plan is not None
+        parts = tuple(new.part if old.sysid == vehicle.sysid else old for old in flight.plan.vehicles)
+        flight.plan = replace(flight.plan, vehicles=parts)
+        self._unconfirmed.pop(vehicle.sysid, None)
+
+    def _reconcile(self) -> None:
+        """Companions that fly a plan whose arrival they could not confirm in time: it is theirs, and not sent again."""
+        for sysid, plans in tuple(self._unconfirmed.items()):
+            status = self.flight.state(sysid).companion.status
+            if status is not None and status.plan_id in plans:
+                vehicle = self.flight.vehicles[sysid]
+                self._take(vehicle, plans[status.plan_id])
+                text = "flies a plan that it could not confirm in time"
+                self.flight.events.add("reconciled", text, vehicle.name, plan_id=status.plan_id)
+
+    def _can_be_told(self, aloft: Sequence[Aloft]) -> bool:
+        """Everybody is heard: the cloud plans for all together, so it waits while one of them is out of reach."""
+        now_s = self.flight.station.now_s
+        return all(self.flight.state(vehicle.sysid).companion_online(now_s) for vehicle in aloft)
+
+    async def _hand_over(self, vehicle: VehicleFlight, items: tuple[MissionItem, ...]) -> None:
+        """Store a mission on a vehicle; over when its companion flies it.
+
+        The companion names a plan by what it has read itself: its word is worth as much as reading the mission back,
+        and on a slow link it is there a good while earlier.
+        """
+        storing = asyncio.ensure_future(upload.swap(self.flight.station, vehicle.sysid, items))
+        flying = asyncio.ensure_future(self._flies(vehicle, plan_id(items)))
+        try:
+            longest_s = HAND_OVER_TIMEOUT_S / self.flight.speed
+            await asyncio.wait((storing, flying), timeout=longest_s, return_when=asyncio.FIRST_COMPLETED)
+            if not (storing.done() or flying.done()):
+                raise LinkLost(f"vehicle {vehicle.sysid} has not got the new plan in time")
+            if not flying.done():
+                storing.result()
+                await asyncio.wait((flying,), timeout=SWAP_TIMEOUT_S / self.flight.speed)
+            if not flying.done():
+                raise LinkLost(f"vehicle {vehicle.sysid} does not say that it flies the new plan")
+        finally:
+            storing.cancel()
+            flying.cancel()
+            await asyncio.gather(storing, flying, return_exceptions=True)
+
+    async def _flies(self, vehicle: VehicleFlight, expected: int) -> None:
+        """Return when the companion says that it flies a plan."""
         companion = self.flight.state(vehicle.sysid).companion
 
         def flies_it() -> bool:
             return companion.status is not None and companion.status.plan_id == expected
 
-        if not await self.flight.station.holds_within(flies_it, SWAP_TIMEOUT_S / self.flight.speed):
-            raise LinkLost(f"vehicle {vehicle.sysid} does not say that it flies the new plan")
+        await self.flight.station.holds_within(flies_it, float("inf"))
 
     # ------------------------------------------------------------------ where the vehicles are
 
@@ -157,7 +220,8 @@ class CloudLoop:
             position_m = self._position_m(vehicle)
             if position_m is None or vehicle.plan is None or not self._is_under_way(vehicle):
                 continue
-            plan, done = vehicle.plan, self._progressed(vehicle, position_m)
+            plan, reach_m = vehicle.plan, 2.0 * self.flight.mission.onboard.horizon_m
+            done = vehicle.progress(position_m, reach_m)
             targets = tuple(target for target in plan.targets if target.name not in vehicle.monitor.route.passed)
             curve_m = plan.curve_m[done:]
             if len(curve_m) > 1 and lengths(plan.curve_m[-1] - position_m) > self._arriving_m:
@@ -176,16 +240,6 @@ class CloudLoop:
             CompanionState.HOLDING,
             Reason.NO_PATH,
         )
-
-    def _progressed(self, vehicle: VehicleFlight, position_m: np.ndarray) -> int:
-        """Index of the sample of its curve beside which a vehicle is; it does not go back."""
-        assert vehicle.plan is not None
-        curve_m, before = vehicle.plan.curve_m, self._progress.get(vehicle.sysid, 0)
-        step_m = max(vehicle.plan.length_m / (len(curve_m) - 1), 1e-6)
-        window = 2 + round(2.0 * self.flight.mission.onboard.horizon_m / step_m)
-        done = before + int(np.argmin(lengths(curve_m[before : before + window] - position_m)))
-        self._progress[vehicle.sysid] = done
-        return done
 
     def _parked(self, aloft: Sequence[Aloft]) -> Iterator[Box]:
         """Vehicles that are planned for no more, as obstacles that keep the others at the required separation."""

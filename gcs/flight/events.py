@@ -9,9 +9,14 @@ from typing import Any, TextIO
 import msgspec
 
 from gcs.dialect import mavlink
+from gcs.unwritten import Unwritten
 
 BEGAN = "began"
 """The event with which a program's log begins: its `unix_us` tells when that was."""
+
+
+MOST_KEPT, KEPT_AFTER = 20_000, 15_000
+"""Events in memory; the file has all of them."""
 
 
 class Severity(Enum):
@@ -36,7 +41,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass
 class EventLog:
-    """Keeps events, writes them as JSON lines, and tells listeners.
+    """Keeps the newest events, writes all of them as JSON lines, and tells listeners.
 
     Args:
         clock: seconds on a monotonic clock.
@@ -52,6 +57,7 @@ class EventLog:
 
     def __post_init__(self) -> None:
         self._started_s = self.clock()
+        self._unwritten = Unwritten("the event log", self.complain)
         self._file: TextIO | None = self.path.open("a" if self.keep else "w", buffering=1) if self.path else None
 
     def add(
@@ -60,14 +66,22 @@ class EventLog:
         t_s = round(self.clock() - self._started_s, 3)
         event = Event(t_s=t_s, vehicle=vehicle, kind=kind, text=text, severity=severity, data=data)
         self.events.append(event)
+        if len(self.events) > MOST_KEPT:
+            del self.events[:-KEPT_AFTER]
         if self._file is not None:
-            self._file.write(msgspec.json.encode(event).decode() + "\n")
+            with self._unwritten:
+                self._file.write(msgspec.json.encode(event).decode() + "\n")
         for listener in self.listeners:
             listener(event)
 
+    def complain(self, text: str) -> None:
+        """A file of the flight can be written no longer."""
+        self.add("disk", text, severity=Severity.ERROR)
+
     def close(self) -> None:
         if self._file is not None:
-            self._file.close()
+            with self._unwritten:
+                self._file.close()
 
 
 def severity_of(mav_severity: int) -> Severity:

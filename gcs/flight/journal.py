@@ -8,6 +8,7 @@ import contextlib
 import fcntl
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from gcs.flight.monitor import Phase
 from gcs.flight.sequence import FleetFlight
 from gcs.planner.plan import FleetPlan, VehiclePlan
 from gcs.settings import PlanningMode
+from gcs.unwritten import Unwritten, unheard
 from missions.errors import WireFormatError
 from missions.mission import Mission, Target
 from missions.mission_items import MissionItem, Track
@@ -150,13 +152,15 @@ class JournalKeeper:
 
     Args:
         path: appended to.
+        say: takes a sentence if it can be written no longer.
 
     Raises:
         BlockingIOError: another ground station that lives writes this journal.
         OSError: it cannot be written.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, say: Callable[[str], None] = unheard) -> None:
+        self._unwritten = Unwritten("the journal", say)
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -205,7 +209,8 @@ class JournalKeeper:
         os.close(self._descriptor)
 
     def _write(self, record: Record) -> None:
-        os.write(self._descriptor, msgspec.json.encode(record) + b"\n")
+        with self._unwritten:
+            os.write(self._descriptor, msgspec.json.encode(record) + b"\n")
 
 
 def is_written(path: Path) -> bool:
@@ -228,7 +233,7 @@ def read_story(path: Path) -> Story | None:
     for line in lines:
         try:
             record = msgspec.json.decode(line, type=Record)
-        except (msgspec.DecodeError, msgspec.ValidationError):
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             continue  # torn by the crash
         if isinstance(record, Began):
             story = Story(record)

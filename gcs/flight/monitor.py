@@ -22,6 +22,9 @@ COMPANION_SILENCE_S = 1.5
 TAKEOVER_GRACE_S = 3.0
 """How long after the start a mode may lag behind the truth: HEARTBEAT shows it up to 1 s late [s]."""
 
+HOLD_AGAIN_S = 1.5
+"""Between two orders to hold, to a vehicle whose companion took over after the operator's [s, wall clock]."""
+
 UNATTENDED_HOLD_S = 5.0
 """With nobody at the page, an interrupted vehicle holds for so long and is then landed [s]."""
 
@@ -85,6 +88,7 @@ class VehicleMonitor:
     """Vehicle time of the start."""
     _started_wall_s: float = 0.0
     _interrupted_wall_s: float = 0.0
+    _hold_again_wall_s: float = 0.0
     _was_at_target: bool = False
 
     def start(self, state: VehicleState, now_s: float) -> None:
@@ -93,6 +97,11 @@ class VehicleMonitor:
             self.started_s = state.vehicle_time_s(now_s, self.speed)
         self.phase, self.reason, self.paused_by_operator = Phase.FLYING, "", False
         self._started_wall_s = now_s
+
+    def pause(self, state: VehicleState, now_s: float) -> None:
+        """The operator is about to order the vehicle away from its mission: to hold, or to go somewhere and hold."""
+        self.paused_by_operator = True
+        self._hold_again_wall_s = now_s + (HOLD_AGAIN_S if state.mode is Mode.OFFBOARD else 0.0)
 
     def step(self, state: VehicleState, now_s: float) -> Mode | None:
         """Look at the vehicle; the mode that the ground has to command now, or None."""
@@ -139,12 +148,21 @@ class VehicleMonitor:
         if state.companion_silence_s(now_s) > COMPANION_SILENCE_S:
             self._interrupt("the companion fell silent", now_s)
             return Mode.HOLD if state.mode is Mode.OFFBOARD else None
+        if self.paused_by_operator and state.mode is Mode.OFFBOARD:
+            return self._hold_again(now_s)
         if now_s - self._started_wall_s < TAKEOVER_GRACE_S:
             return None
         status = state.companion.status
         if status is not None and status.state not in IN_CONTROL | {CompanionState.HOLDING, CompanionState.FINISHED}:
             self._interrupt(f"the companion is {describe(status.state, status.reason)}", now_s)
         return None
+
+    def _hold_again(self, now_s: float) -> Mode | None:
+        """A companion that is about to take over does not see the operator's Hold: the vehicle was holding before."""
+        if now_s < self._hold_again_wall_s:
+            return None
+        self._hold_again_wall_s = now_s + HOLD_AGAIN_S
+        return Mode.HOLD
 
     def _cloud_flight(self, state: VehicleState, now_s: float) -> Mode | None:
         if now_s - self._started_wall_s > TAKEOVER_GRACE_S and state.mode not in CLOUD_MODES:
@@ -161,8 +179,8 @@ class VehicleMonitor:
         status = state.companion.status
         alive = now_s - state.companion.heard_s < COMPANION_SILENCE_S
         if alive and status is not None and status.state in IN_CONTROL:
-            self.phase, self.reason = Phase.FLYING, ""  # a heartbeat was late, or another station resumed the flight
-            return None
+            self.phase, self.reason, self.paused_by_operator = Phase.FLYING, "", False
+            return None  # a heartbeat was late, or another station resumed the flight
         overdue = now_s - self._interrupted_wall_s > UNATTENDED_HOLD_S
         if self.unattended and overdue and state.mode in {Mode.HOLD, Mode.OFFBOARD}:  # never against a pilot's mode
             self.phase = Phase.COMING_DOWN

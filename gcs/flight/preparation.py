@@ -1,25 +1,24 @@
 """What is done on the ground before a vehicle may be armed: hear it, check it, set it up, store fence and mission."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
 
 import numpy as np
 import numpy.typing as npt
 
 from gcs.dialect import AUTOPILOT, mavlink
-from gcs.errors import CommandRefused, PreflightError
+from gcs.errors import CommandRefused, LinkLost, PreflightError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions, preflight, safety_parameters, upload
-from gcs.flight.events import EventLog
 from gcs.flight.fence import fence_items
 from gcs.flight.monitor import Phase, describe
+from gcs.flight.operation import Operation
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.link.shaper import fitting_rates
 from gcs.microservices.command_client import CommandClient
 from gcs.microservices.mission_messages import FENCE
 from gcs.planner.plan import VehiclePlan
 from gcs.settings import PlanningMode
-from gcs.station import Station
 from missions.mission import Mission, OnArrival, Site, Vehicle
 from missions.mission_items import Command as ItemCommand
 from missions.mission_items import MissionItem, encode_track, plan_id
@@ -30,7 +29,8 @@ Array = npt.NDArray[np.float64]
 CONNECT_TIMEOUT_S = 240.0
 """Wall clock; on a fresh machine the companions first compile their planner."""
 
-READY_TIMEOUT_S = 60.0
+SETTLING_S, READY_TIMEOUT_S = 3.0, 60.0
+"""A vehicle that is not ready after the first of them is asked why, and given until the second."""
 COMPANION_READY_TIMEOUT_S = 30.0
 
 FRAME_BYTES = 12
@@ -44,23 +44,8 @@ STREAM_RATES_HZ = {
 }
 
 
-@dataclass(frozen=True)
-class Preparation:
-    """How the vehicles of one flight are prepared.
-
-    Args:
-        station: the links and the fleet's state.
-        mission: with its final origin.
-        mode: who plans.
-        events: where everything of note is written.
-        speed: simulated seconds per wall-clock second.
-    """
-
-    station: Station
-    mission: Mission
-    mode: PlanningMode
-    events: EventLog
-    speed: float
+class Preparation(Operation):
+    """How the vehicles of one flight are prepared."""
 
     async def connect(self, vehicle: Vehicle) -> None:
         """Hear a vehicle, and its companion where one is needed, and order its telemetry.
@@ -137,6 +122,11 @@ class Preparation:
         def problems() -> list[str]:
             return list(preflight.problems(self._state(flight), flight.vehicle, self.mission, self.station.now_s))
 
+        if await self.station.holds_within(lambda: not problems(), SETTLING_S):
+            return
+        if not self._state(flight).ready_to_arm:
+            with suppress(CommandRefused, LinkLost):  # then it has said all that it will
+                await self.station.run(CommandClient(actions.check_readiness(), (flight.sysid, AUTOPILOT)))
         if not await self.station.holds_within(lambda: not problems(), READY_TIMEOUT_S):
             raise PreflightError(f"{flight.name} (vehicle {flight.sysid}): {'; '.join(problems())}")
 

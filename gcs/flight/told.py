@@ -73,6 +73,6 @@ def _decoded(lines: list[bytes]) -> tuple[list[Event], int]:
     for line in lines:
         try:
             events.append(msgspec.json.decode(line, type=Event))
-        except (msgspec.DecodeError, msgspec.ValidationError):
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             continue
     return events, len(lines) - len(events)

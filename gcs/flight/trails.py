@@ -1,11 +1,13 @@
 """Where each vehicle has been, by its own account, for reports, pictures and the page."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from gcs.fleet.fleet import Fleet
+from gcs.fleet.vehicle_state import VehicleState
 from missions.frames import LocalFrame
 
 Array = npt.NDArray[np.float64]
@@ -50,11 +52,22 @@ class Trails:
     by_sysid: dict[int, Trail] = field(default_factory=dict)
 
     def sample(self, fleet: Fleet, ground_offset_m: dict[int, float]) -> None:
-        """Take down where every vehicle is, once per new position."""
-        for sysid, state in fleet.vehicles.items():
-            trail = self.by_sysid.setdefault(sysid, Trail())
-            if trail.times_s and state.boot_time_s <= trail.times_s[-1]:
-                continue
-            position_m = state.position_m(self.frame, ground_offset_m.get(sysid, 0.0))
-            if position_m is not None and np.isfinite(state.boot_time_s):
-                trail.append(state.boot_time_s, position_m, state.velocity_enu_m_s)
+        """Take down where every vehicle is, once per new position; all at once: one by one takes long."""
+        due = [(sysid, state) for sysid, state in fleet.vehicles.items() if self._is_due(sysid, state)]
+        if not due:
+            return
+        places = [state.place for _, state in due if state.place is not None]
+        latitudes, longitudes = [place.latitude_deg for place in places], [place.longitude_deg for place in places]
+        altitudes = [
+            place.altitude_amsl_m - ground_offset_m.get(sysid, 0.0)
+            for (sysid, _), place in zip(due, places, strict=True)
+        ]
+        positions_m = self.frame.enu(latitudes, longitudes, altitudes)
+        for (sysid, state), position_m in zip(due, positions_m, strict=True):
+            self.by_sysid[sysid].append(state.boot_time_s, position_m, state.velocity_enu_m_s)
+
+    def _is_due(self, sysid: int, state: VehicleState) -> bool:
+        """Whether a vehicle has a place that was not taken down yet."""
+        trail = self.by_sysid.setdefault(sysid, Trail())
+        newer = not trail.times_s or state.boot_time_s > trail.times_s[-1]
+        return newer and state.place is not None and math.isfinite(state.boot_time_s)

@@ -1,7 +1,5 @@
 """What one vehicle of a flight can be ordered to do, from arming to landing, and what its monitor has to know of it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -9,13 +7,12 @@ from gcs.dialect import AUTOPILOT, COMPANION, Mode
 from gcs.errors import GcsError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions
-from gcs.flight.events import EventLog, Severity
+from gcs.flight.events import Severity
 from gcs.flight.monitor import Phase
+from gcs.flight.operation import Operation
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.command_client import Command, CommandClient
-from gcs.settings import PlanningMode
-from gcs.station import Station
-from missions.mission import Mission, Site
+from missions.mission import Site
 
 Array = npt.NDArray[np.float64]
 
@@ -23,23 +20,8 @@ TAKEOFF_TIMEOUT_S = 60.0
 """In vehicle time."""
 
 
-@dataclass(frozen=True)
-class VehicleOrders:
-    """Orders to the vehicles of one flight; each raises a GcsError when it is refused or not answered.
-
-    Args:
-        station: the links and the fleet's state.
-        mission: with its final origin.
-        mode: who plans.
-        events: where everything of note is written.
-        speed: simulated seconds per wall-clock second.
-    """
-
-    station: Station
-    mission: Mission
-    mode: PlanningMode
-    events: EventLog
-    speed: float
+class VehicleOrders(Operation):
+    """Orders to the vehicles of one flight; each raises a GcsError when it is refused or not answered."""
 
     async def arm(self, flight: VehicleFlight) -> None:
         """Arm; the autopilot disarms again when no take-off follows soon."""
@@ -79,12 +61,12 @@ class VehicleOrders:
 
     async def hold(self, flight: VehicleFlight) -> None:
         """Stop where it is, on the operator's order."""
-        flight.monitor.paused_by_operator = True
+        flight.monitor.pause(self._state(flight), self.station.now_s)
         await self.command(flight, actions.set_mode(Mode.HOLD))
 
     async def go_to(self, flight: VehicleFlight, place_m: Array) -> None:
         """Fly straight to a (3,) ENU place and hold there, on the operator's order."""
-        flight.monitor.paused_by_operator = True
+        flight.monitor.pause(self._state(flight), self.station.now_s)
         place = self.mission.frame.geodetic(place_m + np.array([0.0, 0.0, flight.monitor.ground_offset_m]))
         await self.command(flight, actions.go_to(place))
 

@@ -1,12 +1,13 @@
-"""A byte stream (TCP, serial) cut into MAVLink frames; what is none is skipped."""
+"""A byte stream (TCP, serial) cut into MAVLink 2 frames; all else is skipped, MAVLink 1, too: it is refused anyway."""
 
 from fastcrc.crc16 import mcrf4xx
 
 from gcs.dialect import mavlink
 
-MAGICS = {0xFD: 12, 0xFE: 8}
-"""First byte -> bytes besides the payload, without a signature."""
-SIGNED, SIGNATURE_BYTES = 0x01, 13
+MAGIC = 0xFD
+UNSIGNED_BYTES, SIGNATURE_BYTES = 12, 13
+"""Of a frame besides its payload."""
+SIGNED = 0x01
 LONGEST_FRAME_BYTES = 280
 
 
@@ -22,42 +23,37 @@ class FrameSplitter:
         pending = self._pending
         pending += data
         frames: list[bytes] = []
-        at = 0
-        while at < len(pending):
+        at = end = 0
+        while (at := pending.find(MAGIC, end)) >= 0:
             length = _frame_length(pending, at)
             if length is None:
                 break
-            if length == 0:
-                at += 1
-                self.skipped_bytes += 1
-                continue
-            frames.append(bytes(pending[at : at + length]))
-            at += length
-        del pending[:at]
+            self.skipped_bytes += at - end + (length == 0)
+            if length:
+                frames.append(bytes(pending[at : at + length]))
+            end = at + max(length, 1)
+        if at < 0:
+            self.skipped_bytes += len(pending) - end
+        del pending[: at if at >= 0 else len(pending)]
         return frames
 
 
 def _frame_length(pending: bytearray, at: int) -> int | None:
     """Length of the frame that begins here; 0 if none does, None if it is not complete yet."""
-    overhead = MAGICS.get(pending[at])
-    if overhead is None:
-        return 0
-    if at + overhead > len(pending):
+    if at + UNSIGNED_BYTES > len(pending):
         return None
-    is_two = pending[at] == 0xFD
-    if is_two and pending[at + 2] & ~SIGNED:
+    if pending[at + 2] & ~SIGNED:
         return 0  # an incompatible flag that nobody has defined
-    unsigned = overhead + pending[at + 1]
-    length = unsigned + (SIGNATURE_BYTES if is_two and pending[at + 2] & SIGNED else 0)
+    unsigned = UNSIGNED_BYTES + pending[at + 1]
+    length = unsigned + (SIGNATURE_BYTES if pending[at + 2] & SIGNED else 0)
     if at + length > len(pending):
         return None
-    return length if _is_sound(pending[at : at + unsigned], is_two) else 0
+    kind = mavlink.mavlink_map.get(int.from_bytes(pending[at + 7 : at + 10], "little"))
+    if kind is None:  # its checksum cannot be told; noise that looks like a frame must not take true ones with it
+        return length if at + length == len(pending) or pending[at + length] == MAGIC else 0
+    return length if _is_sound(pending[at : at + unsigned], kind.crc_extra) else 0
 
 
-def _is_sound(frame: bytearray, is_two: bool) -> bool:
-    """Whether the checksum is right; that of an unknown message cannot be told."""
-    message_id = int.from_bytes(frame[7:10], "little") if is_two else frame[5]
-    kind = mavlink.mavlink_map.get(message_id)
-    if kind is None:
-        return True
-    return mcrf4xx(bytes(frame[1:-2]) + bytes([kind.crc_extra]), 0xFFFF) == int.from_bytes(frame[-2:], "little")
+def _is_sound(frame: bytearray, crc_extra: int) -> bool:
+    checked = bytes(frame[1:-2]) + bytes([crc_extra])
+    return mcrf4xx(checked, 0xFFFF) == int.from_bytes(frame[-2:], "little")

@@ -111,11 +111,13 @@ class SystemPaths(Generic[PathKey]):
                 self.chosen = best
         return self.chosen
 
-    def _badness(self, key: PathKey, now_s: float) -> tuple[bool, float]:
+    def _badness(self, key: PathKey, now_s: float) -> tuple[bool, bool, float]:
+        """A path that has answered nothing may carry nothing back: it takes over from none that is fresh."""
         quality = self.paths[key].quality(now_s)
         stale = quality.age_s > STALE_S
-        bonus = BETTER_LOSS if key == self.chosen else 0.0
-        return stale, quality.age_s if stale else quality.loss - bonus
+        is_chosen = key == self.chosen
+        mute = self.chosen is not None and not is_chosen and quality.round_trip_s is None
+        return stale, mute, quality.age_s if stale else quality.loss - BETTER_LOSS * is_chosen
 
     def rivals(self, now_s: float) -> list[PathKey]:
         """Paths that are alive and lead to another vehicle than the chosen one, which has the same system id."""

@@ -7,9 +7,9 @@ import serial
 
 from gcs.link.connection import Address, Notice, Receiver
 from gcs.link.frames import FrameSplitter
+from gcs.link.retries import Retries
 from gcs.link.url import LinkUrl
 
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 5.0
 READ_BYTES = 4096
 
 
@@ -43,20 +43,20 @@ class SerialLine:
         self._task.cancel()
 
     async def _run(self) -> None:
-        pause_s = FIRST_PAUSE_S
+        loop, retries = asyncio.get_running_loop(), Retries()
         while True:
             try:
                 self._port = serial.Serial(self.url.host, self.url.port, timeout=0, write_timeout=0)
             except (OSError, ValueError) as problem:
-                if pause_s == FIRST_PAUSE_S:
+                if retries.is_first:
                     self._say(f"{self.url}: {problem}; trying again")
             else:
                 self._say(f"{self.url}: open")
-                pause_s = FIRST_PAUSE_S
+                begun_s = loop.time()
                 await self._listen(self._port)
+                retries.held(loop.time() - begun_s)
                 self._say(f"{self.url}: gone; opening it again")
-            await asyncio.sleep(pause_s)
-            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+            await asyncio.sleep(retries.take())
 
     async def _listen(self, port: serial.Serial) -> None:
         loop, number = asyncio.get_running_loop(), port.fileno()

@@ -52,7 +52,7 @@ class ControlPort:
     async def _asked(self, transport: asyncio.DatagramTransport, line: bytes, answers: asyncio.Queue[bytes]) -> _Answer:
         for _ in range(ATTEMPTS):
             transport.sendto(line)
-            with contextlib.suppress(TimeoutError, msgspec.DecodeError):
+            with contextlib.suppress(TimeoutError, msgspec.DecodeError, UnicodeDecodeError):
                 async with asyncio.timeout(PATIENCE_S):
                     return msgspec.json.decode(await answers.get(), type=_Answer)
         raise LinkLost("the simulator's control port does not answer")

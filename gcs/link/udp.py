@@ -10,9 +10,12 @@ from gcs.link.url import LinkUrl, Scheme
 
 RECEIVE_BUFFER_BYTES = 4 << 20
 """A fleet's telemetry arrives in bursts; the kernel's default buffer holds a few hundred datagrams."""
-LARGEST_DATAGRAM_BYTES = 65536
-MOST_AT_ONCE = 256
-"""Datagrams that are taken in before everything else has its turn."""
+LARGEST_DATAGRAM_BYTES = 4096
+"""Frames are short, and senders pack no more of them together than go through a network; what is longer is cut off."""
+DATAGRAM_BYTES = 100
+"""What the handling of a datagram counts for besides its content: empty ones are work, too."""
+MOST_BYTES_AT_ONCE = 32768
+"""What is taken in before everything else has its turn: 20 ms of work, whatever is in it."""
 
 
 class UdpConnection:
@@ -35,13 +38,15 @@ class UdpConnection:
             self._end.close()
 
     def _receive(self) -> None:
-        for _ in range(MOST_AT_ONCE):
+        taken_bytes = 0
+        while taken_bytes < MOST_BYTES_AT_ONCE:
             try:
                 datagram, address = self._end.recvfrom(LARGEST_DATAGRAM_BYTES)
             except ConnectionError:
                 continue  # an ICMP answer to what was sent to somebody who is gone
             except OSError:
                 return
+            taken_bytes += len(datagram) + DATAGRAM_BYTES
             self._receiver(self, datagram, address)
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
+from scipy.spatial import KDTree
 
 from missions.occupancy import BLOCK_VOXELS, BlockIndex, OccupancyBlock, centres_of
 from missions.world import Bounds, Box
@@ -23,10 +24,15 @@ REVISION_WINDOW = 2**31
 """A revision that is ahead of the last one by less than this is newer; the counter wraps."""
 
 
-@dataclass
+NEAREST = 8
+"""The nearest surface belongs to one of so many voxels whose centres are nearest."""
+
+
+@dataclass(frozen=True)
 class _Report:
     revision: int
     block: OccupancyBlock
+    voxels: IntArray
 
 
 class ObservedMap:
@@ -42,6 +48,9 @@ class ObservedMap:
         self._voxel_m: float | None = None
         self.changes = 0
         """Counted up whenever the map looks different."""
+        self._boxes: tuple[Box, ...] = ()
+        self._tree: KDTree | None = None
+        self._boxed_changes = self._tree_changes = 0
         self.refused = 0
         """Blocks outside of the flight range, of another voxel size, or too many."""
 
@@ -55,7 +64,7 @@ class ObservedMap:
         if known is not None and not 0 < (block.revision - known.revision) % 2**32 < REVISION_WINDOW:
             return False
         before = known.block.occupied if known is not None else np.zeros_like(block.occupied)
-        reports[block.index] = _Report(block.revision, block)
+        reports[block.index] = _Report(block.revision, block, block.voxels)
         self._voxel_m = block.voxel_m
         if np.array_equal(before, block.occupied):
             return False
@@ -75,8 +84,8 @@ class ObservedMap:
     @property
     def voxels(self) -> IntArray:
         """(n, 3) indices of the voxels that any vehicle has seen occupied, each once."""
-        seen = [report.block.voxels for reports in self._reports.values() for report in reports.values()]
-        return np.unique(np.concatenate(seen), axis=0) if seen else np.empty((0, 3), np.int64)
+        seen = [report.voxels for reports in self._reports.values() for report in reports.values()]
+        return _once(np.concatenate(seen)) if seen else np.empty((0, 3), np.int64)
 
     @property
     def points_enu_m(self) -> Array:
@@ -85,11 +94,28 @@ class ObservedMap:
 
     def points_of(self, sysid: int) -> Array:
         """(n, 3) centres of the voxels that one vehicle has reported as occupied, ENU [m]."""
-        seen = [report.block.voxels for report in self._reports.get(sysid, {}).values()]
+        seen = [report.voxels for report in self._reports.get(sysid, {}).values()]
         return centres_of(np.concatenate(seen), self.voxel_m) if seen else np.empty((0, 3))
 
     def boxes(self) -> tuple[Box, ...]:
         """The occupied voxels as few boxes, gaps of one voxel between them filled, as a planner reads obstacles."""
+        if self._boxed_changes != self.changes:
+            self._boxes, self._boxed_changes = self._merged(), self.changes
+        return self._boxes
+
+    def clearance(self, points_enu_m: Array) -> Array:
+        """(n,) distances of (n, 3) ENU points from the nearest occupied voxel's surface [m]; infinite without any."""
+        if self._tree_changes != self.changes:
+            centres_m = self.points_enu_m
+            self._tree, self._tree_changes = (KDTree(centres_m) if len(centres_m) else None), self.changes
+        if self._tree is None:
+            return np.full(len(points_enu_m), np.inf)
+        _, nearest = self._tree.query(points_enu_m, k=min(NEAREST, self._tree.n))
+        centres_m = self._tree.data[np.reshape(nearest, (len(points_enu_m), -1))]
+        beside_m = np.abs(centres_m - points_enu_m[:, None]) - 0.5 * self.voxel_m
+        return np.linalg.norm(np.maximum(beside_m, 0.0), axis=2).min(axis=1)
+
+    def _merged(self) -> tuple[Box, ...]:
         spans = merged(_closed(self.voxels))
         lows_m, highs_m = spans[:, :3] * self.voxel_m, spans[:, 3:] * self.voxel_m
         middles, halves = (0.5 * (lows_m + highs_m)).tolist(), (0.5 * (highs_m - lows_m)).tolist()
@@ -106,6 +132,17 @@ class ObservedMap:
         edge_m = BLOCK_VOXELS * block.voxel_m
         low_m = np.array(block.index) * edge_m
         return bool(np.all(low_m < self.bounds.high_enu_m) and np.all(low_m + edge_m > self.bounds.low_enu_m))
+
+
+def _once(voxels: IntArray) -> IntArray:
+    """(n, 3) voxel indices without those that occur before."""
+    if len(voxels) == 0:
+        return voxels
+    low = voxels.min(axis=0)
+    _, size_north, size_up = voxels.max(axis=0) - low + 1
+    east, north, up = (voxels - low).T
+    _, firsts = np.unique((east * size_north + north) * size_up + up, return_index=True)
+    return voxels[firsts]
 
 
 def merged(voxels: Iterable[Iterable[int]] | IntArray) -> IntArray:

@@ -12,7 +12,8 @@ from gcs.errors import ParameterError
 from gcs.microservices import Backoff, Microservice
 
 FIRST_TIMEOUT_S = 0.5
-ATTEMPTS = 8
+ATTEMPTS = 16
+"""Of reading, and again of setting: where half of the messages are lost each way, one in a hundred fails."""
 TOLERANCE = 1e-6
 
 Value = int | float
@@ -25,7 +26,7 @@ class ParameterExchange(Microservice):
     PX4 answers a wrong name, type or index with silence, so a set is preceded by a read, which tells the type.
 
     Raises:
-        ParameterError: no answer, or another value stored than was sent.
+        ParameterError: no answer, another value stored than was sent, or one that the parameter cannot have.
     """
 
     peer: tuple[int, int]
@@ -42,7 +43,11 @@ class ParameterExchange(Microservice):
         self.deadline_s = now_s + self._backoff.take()
         if self._type is None or self.new_value is None:
             return [mavlink.MAVLink_param_request_read_message(*self.peer, self.name.encode(), -1)]
-        encoded = encode(self.new_value, self._type)
+        try:
+            encoded = encode(self.new_value, self._type)
+        except ValueError as wrong:
+            self.done = True
+            raise ParameterError(f"vehicle {self.peer[0]}: parameter {self.name}: {wrong}; nothing was set") from None
         return [mavlink.MAVLink_param_set_message(*self.peer, self.name.encode(), encoded, self._type)]
 
     def receive(self, message: Message, now_s: float) -> list[Message]:
@@ -53,7 +58,10 @@ class ParameterExchange(Microservice):
         if self.new_value is None or _equal(self.value, self.new_value):
             self.done = True
             return []
-        return self.start(now_s) if first_answer else []
+        if not first_answer:
+            return []
+        self._backoff = Backoff(FIRST_TIMEOUT_S, ATTEMPTS)
+        return self.start(now_s)
 
     def handle_timeout(self, now_s: float) -> list[Message]:
         if self._backoff.exhausted:
@@ -80,10 +88,24 @@ _INTEGER_FORMATS = {
 
 
 def encode(value: Value, kind: int) -> float:
-    """A value as it travels, the bytes of an integer in those of a float32."""
-    if (layout := _INTEGER_FORMATS.get(kind)) is not None:
-        return struct.unpack("<f", struct.pack(layout, round(value)))[0]
-    return float(value)
+    """A value as it travels, the bytes of an integer in those of a float32.
+
+    Raises:
+        ValueError: the type does not hold the value.
+    """
+    layout = _INTEGER_FORMATS.get(kind)
+    if layout is not None and not float(value).is_integer():
+        raise ValueError(f"expected an integer, found {value:g}")
+    try:
+        packed = struct.pack(layout, int(value)) if layout is not None else struct.pack("<f", value)
+    except (struct.error, OverflowError):
+        raise ValueError(f"expected a value that fits into 32 bits, found {value:g}") from None
+    if layout is None:
+        return float(value)
+    (carried,) = struct.unpack("<f", packed)
+    if struct.pack("<f", carried) != packed:  # a signalling NaN, which loses its nature on the way through a float
+        raise ValueError(f"{value:g} cannot be carried by this protocol")
+    return carried
 
 
 def decode(message: Message, kind: int | None = None) -> Value:

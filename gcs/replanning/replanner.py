@@ -10,9 +10,7 @@ import numpy.typing as npt
 from gcs.mapping.observed_map import ObservedMap
 from gcs.planner.plan import FleetPlan
 from gcs.replanning.remaining import Aloft
-from missions import obstacles
 from missions.mission import Mission
-from missions.world import World
 
 Array = npt.NDArray[np.float64]
 
@@ -23,6 +21,19 @@ class Cause(Enum):
     BLOCKED = "the plan is blocked by what was seen"
     EDITED = "the operator has changed the mission"
     REVIEW = "the map has changed since the plan was made"
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What a plan knows.
+
+    Args:
+        changes: of the map of what was seen, counted.
+        edits: by the operator, counted.
+    """
+
+    changes: int
+    edits: int
 
 
 @dataclass(frozen=True)
@@ -57,31 +68,44 @@ class Replanner:
     mission: Mission
     observed: ObservedMap
     settings: ReplanSettings = ReplanSettings()
-    planned_changes: int = 0
-    """The state of the map that the plan being flown knows."""
+    _edits: int = 0
     _not_before_s: float = -np.inf
     _review_s: float = -np.inf
-    _edited: bool = False
 
     def __post_init__(self) -> None:
-        self._packed = obstacles.pack(World(bounds=self.mission.world.bounds))
-        self._packed_changes = 0
+        self._planned = self._before = Basis(changes=0, edits=0)  # of the plan that is flown, and of the one before it
+        self._clear_in: tuple[Basis, int] | None = None
 
     def edit(self, mission: Mission) -> None:
         """The operator has changed what is flown: the next look has a cause."""
-        self.mission, self._edited, self._not_before_s = mission, True, -np.inf
+        self.mission, self._not_before_s = mission, -np.inf
+        self._edits += 1
+
+    @property
+    def basis(self) -> Basis:
+        """What a plan that is begun now will know."""
+        return Basis(self.observed.changes, self._edits)
 
     def look(self, aloft: Sequence[Aloft], now_s: float) -> Cause | None:
         """Why a new plan is wanted now, or None."""
         if not aloft or now_s < self._not_before_s:
             return None
-        if self._edited:
+        if self._edits != self._planned.edits:
             return Cause.EDITED
-        if self.observed.changes == self.planned_changes:
+        if self.observed.changes == self._planned.changes:
             return None
-        if any(self.is_blocked(vehicle.curve_m) for vehicle in aloft):
+        if self._is_any_blocked(aloft):
             return Cause.BLOCKED
         return Cause.REVIEW if now_s >= self._review_s else None
+
+    def _is_any_blocked(self, aloft: Sequence[Aloft]) -> bool:
+        """What is left of somebody's curve is blocked; it is looked at once for each state of plan and map."""
+        state = self._planned, self.observed.changes
+        if self._clear_in == state:
+            return False  # what is left has only become less
+        blocked = any(self.is_blocked(vehicle.curve_m) for vehicle in aloft)
+        self._clear_in = None if blocked else state
+        return blocked
 
     def is_blocked(self, curve_m: Array) -> bool:
         """A curve of (m, 3) ENU samples comes too near to what was seen.
@@ -91,26 +115,27 @@ class Replanner:
         if not len(curve_m):
             return False
         required_m = max(self.mission.limits.clearance_m - self.observed.voxel_m, self.mission.limits.body_radius_m)
-        return float(obstacles.clearance(curve_m, self._seen()).min()) < required_m
+        return float(self.observed.clearance(curve_m).min()) < required_m
 
-    def judge(self, cause: Cause, plan: FleetPlan, aloft: Sequence[Aloft], changes: int, now_s: float) -> str:
+    def judge(self, cause: Cause, plan: FleetPlan, aloft: Sequence[Aloft], basis: Basis, now_s: float) -> str:
         """Why a new plan is not flown, as a phrase; empty if it is.
 
         Args:
             cause: why it was asked for.
             plan: for all vehicles in flight.
             aloft: as it was when it was asked for.
-            changes: `observed.changes` then.
+            basis: `basis` then.
             now_s: vehicle time.
         """
+        if basis.edits != self._edits:
+            return "the operator has changed the mission meanwhile"
         if not plan.feasible:
             self.put_off(now_s)
             return "; ".join(str(violation) for violation in plan.violations)
         self._not_before_s, self._review_s = now_s + self.settings.interval_s, now_s + self.settings.review_s
-        self.planned_changes = changes  # the plan that is flown from now on, old or new, is good for this map
+        self._before, self._planned = self._planned, basis  # what is flown from now on, old or new, is good for this
         if cause is Cause.REVIEW and not self._materially_better(plan, aloft):
             return "it is not materially better"
-        self._edited = False
         return ""
 
     def put_off(self, now_s: float) -> None:
@@ -118,17 +143,11 @@ class Replanner:
         self._not_before_s = now_s + self.settings.retry_s
 
     def forget_plan(self) -> None:
-        """Not every vehicle has got the new plan: what is flown may not know the map, so it is looked at anew."""
-        self.planned_changes = -1
+        """Not every vehicle has got the new plan: what is flown may know neither the map nor the operator's edits."""
+        self._planned = Basis(changes=-1, edits=self._before.edits)
 
     def _materially_better(self, plan: FleetPlan, aloft: Sequence[Aloft]) -> bool:
         now_takes_s = max(vehicle.remaining_s for vehicle in aloft)
         then_takes_s = max(float(part.times_s[-1]) for part in plan.vehicles)
         saved_s = now_takes_s - then_takes_s
         return saved_s > max(self.settings.better_s, self.settings.better_share * now_takes_s)
-
-    def _seen(self) -> obstacles.Obstacles:
-        if self._packed_changes != self.observed.changes:
-            self._packed = obstacles.pack(World(bounds=self.mission.world.bounds, boxes=self.observed.boxes()))
-            self._packed_changes = self.observed.changes
-        return self._packed

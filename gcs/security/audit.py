@@ -6,6 +6,7 @@ answered. Files are appended to, never rewritten.
 """
 
 import os
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -16,9 +17,12 @@ from typing import Any
 
 import msgspec
 
-from gcs.dialect import Message, enum_name
+from gcs.dialect import Message, enum_name, mavlink
+from gcs.unwritten import Unwritten, unheard
 
 AUDIT_FILE = "audit.jsonl"
+_PAYLOAD_AT = 10
+"""In a MAVLink 2 frame; a parameter's value comes first in it."""
 MOST_PENDING = 1000
 """Orders that wait for an answer; of more, the oldest are taken for unanswered."""
 
@@ -144,13 +148,20 @@ class Audit:
 
 
 class AuditFile:
-    """An audit log in a file, which is appended to; each entry is on its way to the disk before its frame is sent."""
+    """An audit log in a file, which is appended to; each entry is on its way to the disk before its frame is sent.
 
-    def __init__(self, path: Path) -> None:
+    Args:
+        path: the file.
+        say: takes a sentence if it can be written no longer; orders go out all the same, since one of them may be Hold.
+    """
+
+    def __init__(self, path: Path, say: Callable[[str], None] = unheard) -> None:
         self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        self._unwritten = Unwritten("the audit log", say)
 
     def write(self, line: bytes) -> None:
-        os.write(self._descriptor, line)
+        with self._unwritten:
+            os.write(self._descriptor, line)
 
     def close(self) -> None:
         os.close(self._descriptor)
@@ -170,7 +181,13 @@ def _command(message: Message) -> Described:
 
 def _parameter(message: Message) -> Described:
     name = message.param_id if isinstance(message.param_id, str) else message.param_id.decode()
-    return name, "PARAM_SET", {"name": name, "value": message.param_value}
+    return name, "PARAM_SET", {"name": name, "value": _carried(struct.pack("<f", message.param_value), message)}
+
+
+def _carried(four_bytes: bytes, message: Message) -> float | int:
+    """A parameter's value: PX4 puts the bytes of an integer where the message has a float."""
+    layout = {mavlink.MAV_PARAM_TYPE_INT32: "<i", mavlink.MAV_PARAM_TYPE_UINT32: "<I"}.get(message.param_type, "<f")
+    return struct.unpack(layout, four_bytes)[0]
 
 
 def _plan(message: Message) -> Described:
@@ -209,7 +226,8 @@ def _stored(message: Message) -> Answered:
 
 
 def _set(message: Message) -> Answered:
-    return ("PARAM_SET",), message.param_id, f"value {message.param_value:g}", True
+    value = _carried(bytes(message.get_msgbuf()[_PAYLOAD_AT : _PAYLOAD_AT + 4]), message)
+    return ("PARAM_SET",), message.param_id, f"value {value:g}" if isinstance(value, float) else f"value {value}", True
 
 
 _ANSWERS: dict[str, Callable[[Message], Answered]] = {

@@ -17,6 +17,7 @@ import msgspec
 
 from gcs.errors import KeyRingError
 from gcs.security.signing import KEY_BYTES, LATEST_TICK, Signing, VehicleKey
+from gcs.unwritten import unheard
 
 KEYS, PENDING, TIMESTAMPS = "keys", "pending", "timestamps.json"
 MOST_BYTES = 1 << 20
@@ -94,13 +95,29 @@ class KeyRing:
         except OSError as problem:
             raise KeyRingError(f"{self.folder}: keys cannot be written: {problem.strerror}") from None
 
-    def signing(self, unix_us: Callable[[], int]) -> Signing:
+    def signing(self, unix_us: Callable[[], int], say: Callable[[str], None] = unheard) -> Signing:
         """Signing with the keys of this ring, which keeps itself in it.
+
+        Where that fails, on a full disk, the vehicles are heard all the same: not to hear them is the greater danger.
+
+        Args:
+            unix_us: the wall clock.
+            say: takes a sentence when what was used of the keys can be kept no longer.
 
         Raises:
             KeyRingError: see `load`.
         """
-        return Signing(self.load(), unix_us, self.save)
+        told: list[str] = []
+
+        def keep(vehicles: dict[int, VehicleKey]) -> None:
+            try:
+                self.save(vehicles)
+            except KeyRingError as problem:
+                if not told:
+                    told.append(str(problem))
+                    say(f"{problem}: a ground station that is started after this one may take old frames for new")
+
+        return Signing(self.load(), unix_us, keep)
 
     def ensure(self, sysids: Iterable[int]) -> None:
         """Make the keys that are missing and put them into force at once, for vehicles that will be given them.

@@ -18,10 +18,9 @@ LEAST_SPACING_M = 1.0
 
 
 class Aiming:
-    """One click at a time: armed by the button, it is over with the next click of the same browser.
+    """One click at a time in each browser: armed by the button, it is over with the next click.
 
     Args:
-        server: of the page.
         desk: what is commanded.
         presses: hands intents over.
         selected: whom the order concerns.
@@ -32,7 +31,6 @@ class Aiming:
 
     def __init__(
         self,
-        server: viser.ViserServer,
         desk: Desk,
         presses: Presses,
         selected: Callable[[], Iterable[int]],
@@ -40,29 +38,25 @@ class Aiming:
         far_m: Callable[[], float],
         height_m: Callable[[], float],
     ) -> None:
-        self._server, self._desk, self._presses = server, desk, presses
+        self._desk, self._presses = desk, presses
         self._selected, self._ground_height_m = selected, ground_height_m
         self._far_m, self._height_m = far_m, height_m
-        self._click: Callable[[viser.SceneClickEvent], None] | None = None
 
     def begin(self, client: viser.ClientHandle) -> None:
-        """The next click of this browser in the scene is the place; called in a thread of viser."""
-        self._end()
+        """The next click of this browser in the scene is the place; called in a thread of viser.
+
+        The click is awaited before the browser is told to click, and on the same connection: what it says then holds.
+        """
 
         def click(event: viser.SceneClickEvent) -> None:
-            if event.client.client_id == client.client_id:
-                self._end()
-                self._go(event.client, np.array(event.ray_origin), np.array(event.ray_direction))
+            client.scene.remove_click_callback()
+            self._go(event.client, np.array(event.ray_origin), np.array(event.ray_direction))
 
-        self._click = self._server.scene.on_click()(click)
+        client.scene.remove_click_callback()
+        client.scene.on_click()(click)
         client.add_notification(
             "Click at the place", "The selected vehicles fly there and hold.", auto_close_seconds=AIM_S, color=BRAND
         )
-
-    def _end(self) -> None:
-        if self._click is not None:
-            self._server.scene.remove_click_callback(self._click)
-            self._click = None
 
     def _go(self, client: viser.ClientHandle, origin_m: Array, direction: Array) -> None:
         place_m = ground_under(origin_m, direction, self._ground_height_m, self._far_m())

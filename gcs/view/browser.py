@@ -16,10 +16,12 @@ from gcs.view.labels import Lens
 from gcs.view.overlay import Overlay, Tag
 from gcs.view.sightings import Sighting
 from gcs.view.theme import Theme
-from gcs.view.vehicle_scene import GroundHeight, Pick, VehicleScene
+from gcs.view.vehicle_scene import MANY, GroundHeight, Pick, VehicleScene
 
 Array = npt.NDArray[np.float64]
 
+SLOWER = 2
+"""Tags of a large fleet are drawn at every second update, and at every move of the camera."""
 MOST_FRAMES_S = 0.04
 """While a camera moves, its overlay follows at this interval."""
 
@@ -42,7 +44,7 @@ class Browser:
         self._vehicles = VehicleScene(client.scene, ground_height_m, on_pick, theme)
         self._overlay, self._tags, self._places_m = Overlay(), [], np.zeros((0, 3))
         self._drawn: Lens | None = None
-        self._waiting = False
+        self._waiting, self._updates = False, 0
         panel = client.gui.add_panel()
         with panel.add_tab(" "):
             client.gui.add_html(f"<style>{files('gcs.view').joinpath('overlay.css').read_text()}</style>")
@@ -62,10 +64,12 @@ class Browser:
         """Bring it up to date: vehicles, and the (n, 3) places of what has a tag."""
         lens = self.lens
         self._tags, self._places_m = list(tags), places_m
+        self._updates += 1
         with self._client.atomic():
             self._vehicles.move(seen, lens)
-            self._html.content = self._overlay.render(self._tags, self._places_m, lens)
-        self._drawn = lens
+            if len(seen) <= MANY or self._updates % SLOWER:
+                self._html.content = self._overlay.render(self._tags, self._places_m, lens)
+                self._drawn = lens
 
     def explain(self, legend: str) -> None:
         """Show this legend from now on."""

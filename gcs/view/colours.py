@@ -20,7 +20,6 @@ PALETTE: tuple[Rgb, ...] = (
 )
 """Colours of the first vehicles: bright on dark, and neither the red of threats nor the orange of unmapped things."""
 
-GROUND: Rgb = (58, 68, 86)
 THREAT: Rgb = (255, 70, 70)
 UNMAPPED: Rgb = (255, 150, 40)
 TARGET: Rgb = (230, 236, 245)
@@ -58,7 +57,7 @@ def css(colour: Rgb) -> str:
     return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
-def faded(colour: Rgb, towards: Rgb = GROUND, share: float = 0.5) -> Rgb:
+def faded(colour: Rgb, towards: Rgb, share: float) -> Rgb:
     """A colour on its way to another one: `share` 0 is itself, 1 the other."""
     red, green, blue = (round(own + (other - own) * share) for own, other in zip(colour, towards, strict=True))
     return red, green, blue

@@ -1,6 +1,7 @@
 """Editing a mission in the scene: a gizmo on what was picked, buttons for what is added, and saving as a file.
 
-What is edited is a draft. Nobody flies it: it is saved by the browser as a mission file, which can then be loaded.
+What is edited is a draft. Nobody flies it before it is loaded, or saved by the browser as a mission file and loaded
+later.
 """
 
 import asyncio
@@ -26,6 +27,8 @@ NEW_SHARE = 0.05
 ANYWHERE = (-1e5, 1e5)
 NOTHING = "–"
 
+LoadDraft = Callable[[Mission, viser.ClientHandle], None]
+"""Asks for a draft to be loaded, in the name of a browser; called in a thread of viser."""
 Show = Callable[[Mission, Callable[[Part], None] | None], None]
 """Draws a mission; with a function that is told what was clicked, in a thread of viser."""
 
@@ -37,10 +40,11 @@ class EditingPanel:
         server: of the page.
         mission: as it was loaded.
         show: see `Show`.
+        load: see `LoadDraft`.
     """
 
-    def __init__(self, server: viser.ViserServer, mission: Mission, show: Show) -> None:
-        self._server, self._show, self._loaded = server, show, mission
+    def __init__(self, server: viser.ViserServer, mission: Mission, show: Show, load: LoadDraft) -> None:
+        self._server, self._show, self._loaded, self._load = server, show, mission, load
         self._draft, self._loop = Draft(mission), asyncio.get_running_loop()
         self._size_m = float(np.linalg.norm(mission.world.bounds.high_enu_m - mission.world.bounds.low_enu_m))
         self._picked: Part | None = None
@@ -127,6 +131,8 @@ class EditingPanel:
         self._redo = self._button("Redo", viser.Icon.ARROW_FORWARD_UP, QUIET, lambda: self._step(self._draft.redo))
         self._save = gui.add_button("Save", icon=viser.Icon.DEVICE_FLOPPY, color=BRAND, hint="as a mission file")
         self._save.on_click(self._download)
+        loading = gui.add_button("Load draft", icon=viser.Icon.FOLDER_OPEN, color=BRAND, hint="to plan and fly it")
+        loading.on_click(lambda event: self._load(self.draft, event.client) if event.client is not None else None)
 
     def _button(self, label: str, icon: viser.IconName, colour: Rgb, act: Callable[[], None]) -> viser.GuiButtonHandle:
         button = self._server.gui.add_button(label, icon=icon, color=colour)

@@ -3,12 +3,15 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from html import escape
 
 import numpy as np
 
 from gcs.desk import Desk
-from gcs.flight.monitor import VehicleMonitor
+from gcs.fleet.vehicle_state import VehicleState
+from gcs.flight.monitor import Phase, VehicleMonitor
+from gcs.flight.preflight import autopilots_reasons
 from gcs.view import words
 from gcs.view.colours import Rgb, Tone, css
 from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
@@ -29,8 +32,10 @@ HEADINGS = (
     "Replan",
     "Heard",
     "Link",
+    "Signed",
 )
 
+EMPTY = f"<td>{NOTHING}</td>"
 FEW = 6
 """Vehicles up to which there is room for air between the rows."""
 
@@ -56,6 +61,7 @@ class Row:
     replan_ms: float = math.nan
     heard: tuple[str, Tone] = (NOTHING, Tone.QUIET)
     quality: float = math.nan
+    trust: tuple[str, Tone] = (NOTHING, Tone.QUIET)
 
 
 def rows(desk: Desk, seen: Iterable[Sighting], selected: set[int], now_s: float) -> list[Row]:
@@ -89,8 +95,8 @@ def _row(
         colour,
         sysid in selected,
         mode=words.mode_words(state, now_s),
-        phase=words.phase_words(monitor.phase if monitor else None, monitor is not None and monitor.reached),
-        reason=monitor.reason if monitor else "",
+        phase=_phase(state, monitor),
+        reason=_reason(state, monitor),
         battery_percent=state.battery_percent,
         height_m=float(sighting.position_m[2]) if sighting else math.nan,
         speed_m_s=float(np.linalg.norm(state.velocity_enu_m_s)) if sighting else math.nan,
@@ -102,7 +108,26 @@ def _row(
         replan_ms=status.replan_p50_ms if status is not None and status.replans else math.nan,
         heard=words.age_words(now_s - state.telemetry_s),
         quality=outlook.link_quality if outlook is not None else math.nan,
+        trust=words.trust_words(desk.station.codec.signing.trust(sysid)),
     )
+
+
+def _is_unready(state: VehicleState, monitor: VehicleMonitor | None) -> bool:
+    """On the ground, and its autopilot would refuse to arm."""
+    waits = monitor is None or monitor.phase is Phase.WAITING
+    return waits and not state.armed and not state.ready_to_arm and math.isfinite(state.status_s)
+
+
+def _phase(state: VehicleState, monitor: VehicleMonitor | None) -> tuple[str, Tone]:
+    if _is_unready(state, monitor):
+        return "not ready", Tone.WARN
+    return words.phase_words(monitor.phase if monitor else None, monitor is not None and monitor.reached)
+
+
+def _reason(state: VehicleState, monitor: VehicleMonitor | None) -> str:
+    """Why it is in its phase; of one that is not ready, in the autopilot's own words."""
+    said = "; ".join(autopilots_reasons(state)) if _is_unready(state, monitor) else ""
+    return said or (monitor.reason if monitor else "")
 
 
 def _distance_m(sighting: Sighting | None, monitor: VehicleMonitor | None) -> float:
@@ -112,43 +137,51 @@ def _distance_m(sighting: Sighting | None, monitor: VehicleMonitor | None) -> fl
 
 
 def _render_row(row: Row) -> str:
-    cells = (
-        f'<td class="name"><s style="background:{css(row.colour)}"></s>{escape(row.name)}</td>',
-        _words(row.mode),
-        _words(row.phase, row.reason),
-        _battery(row.battery_percent),
-        _number(row.height_m, "m"),
-        _number(row.speed_m_s, "m/s"),
-        _number(row.clearance_m, "m"),
-        _number(row.to_target_m, "m"),
-        _progress(row.progress),
-        f"<td>{words.duration_words(row.eta_s)}</td>",
-        _words(row.companion),
-        _number(row.replan_ms, "ms"),
-        _words(row.heard),
-        _words(words.quality_words(row.quality)),
+    return "".join(
+        (
+            '<tr class="selected">' if row.selected else "<tr>",
+            _name(row.name, row.colour),
+            _words(*row.mode),
+            _words(*row.phase, row.reason),
+            _battery(row.battery_percent),
+            _number(row.height_m, "m"),
+            _number(row.speed_m_s, "m/s"),
+            _number(row.clearance_m, "m"),
+            _number(row.to_target_m, "m"),
+            _progress(row.progress),
+            f"<td>{words.duration_words(row.eta_s)}</td>",
+            _words(*row.companion),
+            _number(row.replan_ms, "ms"),
+            _words(*row.heard),
+            _words(*words.quality_words(row.quality)),
+            _words(*row.trust),
+            "</tr>",
+        )
     )
-    selected = ' class="selected"' if row.selected else ""
-    return f"<tr{selected}>{''.join(cells)}</tr>"
 
 
-def _words(words_and_tone: tuple[str, Tone], title: str = "") -> str:
-    text, tone = words_and_tone
+@lru_cache(maxsize=4096)
+def _name(name: str, colour: Rgb) -> str:
+    return f'<td class="name"><s style="background:{css(colour)}"></s>{escape(name)}</td>'
+
+
+@lru_cache(maxsize=4096)
+def _words(text: str, tone: Tone, title: str = "") -> str:
     hover = f' title="{escape(title)}"' if title else ""
     return f'<td{hover}><i class="{tone.value}">{escape(text)}</i></td>'
 
 
 def _battery(percent: float) -> str:
-    if math.isnan(percent):
-        return f"<td>{NOTHING}</td>"
-    tone = words.battery_tone(percent).value
-    return f'<td><em class="{tone}"><q style="width:{percent:.0f}%"></q></em>{percent:.0f} %</td>'
+    return _bar(round(percent), words.battery_tone(percent)) if math.isfinite(percent) else EMPTY
 
 
 def _progress(share: float) -> str:
-    if math.isnan(share):
-        return f"<td>{NOTHING}</td>"
-    return f'<td><em class="info"><q style="width:{100 * share:.0f}%"></q></em>{100 * share:.0f} %</td>'
+    return _bar(round(100 * share), Tone.INFO) if math.isfinite(share) else EMPTY
+
+
+@lru_cache(maxsize=512)
+def _bar(percent: int, tone: Tone) -> str:
+    return f'<td><em class="{tone.value}"><q style="width:{percent}%"></q></em>{percent} %</td>'
 
 
 def _number(value: float, unit: str) -> str:

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from html import escape
 
-from gcs.view.colours import THREAT, UNMAPPED, Rgb, css
+from gcs.view.colours import PALETTE, THREAT, UNMAPPED, Rgb, css
 from gcs.view.theme import Theme
 from missions.mission import Mission
 
-VEHICLE: Rgb = (77, 184, 255)
-AHEAD: Rgb = (190, 224, 255)
+VEHICLE = PALETTE[0]
+"""Lines are explained in the first vehicle's colour."""
 
 Entry = tuple[str, Rgb, str]
 """CSS class of the sample, its colour, and what it means."""
@@ -24,12 +24,12 @@ def render(mission: Mission | None, theme: Theme, *, simulated: bool) -> str:
 
 
 def _entries(mission: Mission | None, theme: Theme, simulated: bool) -> Iterator[Entry]:
-    yield "line", AHEAD, "flown next (on board)"
-    yield "line", VEHICLE, "flown so far"
+    yield "line", theme.line_ahead(VEHICLE), "flown next (on board)"
+    yield "line", theme.line_behind(VEHICLE), "flown so far"
     if mission is None:
         return
-    yield "thin", VEHICLE, "planned by the cloud"
-    yield "dot", VEHICLE, "track point"
+    yield "thin", theme.line_planned(VEHICLE), "planned by the cloud"
+    yield "dot", theme.line_planned(VEHICLE), "track point"
     yield "diamond", VEHICLE, "target, in its vehicle's colour"
     yield "area", theme.bounds, "flight range"
     yield "dashed", theme.fence, "geofence"
@@ -42,6 +42,7 @@ def _entries(mission: Mission | None, theme: Theme, simulated: bool) -> Iterator
         yield "area", UNMAPPED, "there, but not on the map"
     if world.peaks:
         yield "thin", theme.contour, "contour line"
+    yield "dot", theme.observed, "seen by vehicles, not on the map"
 
 
 def _has_unmapped(mission: Mission) -> bool:

@@ -95,20 +95,32 @@ class FleetTrails:
         return chunks
 
 
-def thinned(points_m: Array, tolerance_m: float) -> Array:
-    """Fewer of (n, 3) points of a line: without those that lie about on the way between their neighbours."""
-    while len(points_m) > 2:
-        before, here, after = points_m[:-2:2], points_m[1:-1:2], points_m[2::2]
-        spare = np.linalg.norm(here - (before + after) / 2, axis=1) < tolerance_m
-        if not spare.any():
-            break
-        keep = np.ones(len(points_m), dtype=bool)
-        keep[1:-1:2] = ~spare
-        points_m = points_m[keep]
-    return points_m
+def thinned(chunks_m: Array, tolerance_m: float) -> npt.NDArray[np.bool_]:
+    """Which of (k, m, 3) points of k lines are needed; not those about on the way between their neighbours.
+
+    A point halfway between two that stay may go once all others between them have gone.
+    """
+    needed = np.ones(chunks_m.shape[:2], dtype=bool)
+    step = 1
+    while 2 * step < chunks_m.shape[1]:
+        middles = np.arange(step, chunks_m.shape[1] - step, 2 * step)
+        chords_m = (chunks_m[:, middles - step] + chunks_m[:, middles + step]) / 2
+        spare = np.linalg.norm(chunks_m[:, middles] - chords_m, axis=2) < tolerance_m
+        for beside in (*range(1 - step, 0), *range(1, step)):
+            spare &= ~needed[:, middles + beside]
+        needed[:, middles] = ~spare
+        step *= 2
+    return needed
 
 
-@dataclass(frozen=True)
+def joined_where(chunks_m: Array, needed: npt.NDArray[np.bool_]) -> tuple[Array, npt.NDArray[np.int64]]:
+    """(n, 2, 3) segments along the needed ones of (k, m, 3) points, and (n,) of which line each is."""
+    points_m, of_line = chunks_m[needed], np.nonzero(needed)[0]
+    same = of_line[1:] == of_line[:-1]
+    return np.stack((points_m[:-1][same], points_m[1:][same]), axis=1), of_line[1:][same]
+
+
+@dataclass(frozen=True, eq=False)
 class SealedLine:
     """A line that has been sealed: (n, 2, 3) segments [m] and the (n, 2, 3) colours of their ends."""
 
@@ -130,18 +142,20 @@ class SealedLines:
     _lines: list[SealedLine] = field(default_factory=list)
     _names: int = 0
 
-    def add(self, segments: Array, colour: tuple[int, int, int]) -> tuple[list[SealedLine], list[SealedLine]]:
-        """Seal (n, 2, 3) segments, n at most `BATCH`; the lines that are new by that, and those that are no more."""
+    def add(self, segments: Array, colours: Colours) -> tuple[list[SealedLine], list[SealedLine]]:
+        """Seal (n, 2, 3) segments of (n, 3) colours; the lines that are new by that, and those that are no more."""
         new: list[SealedLine] = []
         gone: list[SealedLine] = []
-        if self._filled + len(segments) > BATCH:
-            self._settle(new, gone)
-        end = self._filled + len(segments)
-        self.batch[self._filled : end] = segments
-        self.batch[end:] = segments[-1, 1]
-        self.colours[self._filled : end] = colour
-        self._filled = end
-        return new, gone
+        while len(segments):
+            if self._filled == BATCH:
+                self._settle(new, gone)
+            room = BATCH - self._filled
+            end = self._filled + len(segments[:room])
+            self.batch[self._filled : end] = segments[:room]
+            self.batch[end:] = segments[:room][-1, 1]
+            self.colours[self._filled : end] = colours[:room, None]
+            self._filled, segments, colours = end, segments[room:], colours[room:]
+        return [line for line in new if line not in gone], [line for line in gone if line not in new]
 
     def _settle(self, new: list[SealedLine], gone: list[SealedLine]) -> None:
         line = self._named(self.batch[: self._filled].copy(), self.colours[: self._filled].copy(), 0)
@@ -170,8 +184,10 @@ class SealedLines:
 class AheadLine:
     """What a companion is about to fly."""
 
-    points_m: Array = field(default_factory=lambda: np.zeros((AHEAD, 3)))
-    """Along its trajectory."""
+    points_m: Array | None = None
+    """(AHEAD, 3) along its trajectory; None before they were worked out."""
+    control_m: Array = field(default_factory=lambda: np.zeros((4, 3)))
+    """(n, 3) control points of its trajectory."""
     shown: bool = False
     _revision: int | None = None
 
@@ -181,18 +197,26 @@ class AheadLine:
         self.shown = trajectory is not None and alive and status is not None and status.state in STEERING
         if self.shown and trajectory is not None and companion.trajectory_revision != self._revision:
             self._revision = companion.trajectory_revision
-            control_m = trajectory.control_points_m
-            self.points_m = _basis(len(control_m)) @ control_m
+            self.control_m, self.points_m = trajectory.control_points_m, None
 
 
 def ways_ahead(lines: list[AheadLine], positions_m: Array) -> Array:
     """(n * AHEAD, 2, 3) segments of what lies ahead of n vehicles at (n, 3) positions, from each vehicle onwards."""
+    _work_out([line for line in lines if line.points_m is None])
     shown = np.array([line.shown for line in lines])
     points_m = np.array([line.points_m for line in lines])
     points_m = np.where(shown[:, None, None], points_m, positions_m[:, None])
     nearest = np.argmin(np.sum((points_m - positions_m[:, None]) ** 2, axis=2), axis=1)
     following = np.minimum(nearest[:, None] + 1 + np.arange(AHEAD), AHEAD - 1)
     return _joined(positions_m[:, None], np.take_along_axis(points_m, following[..., None], axis=1))
+
+
+def _work_out(lines: list[AheadLine]) -> None:
+    """Points along new trajectories, those of as many control points at once."""
+    for count in {len(line.control_m) for line in lines}:
+        alike = [line for line in lines if len(line.control_m) == count]
+        for line, points_m in zip(alike, _basis(count) @ np.array([line.control_m for line in alike]), strict=True):
+            line.points_m = points_m
 
 
 def _joined(first_m: Array, then_m: Array) -> Array:

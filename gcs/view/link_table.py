@@ -6,11 +6,12 @@ from html import escape
 from gcs.desk import Desk
 from gcs.dialect import AUTOPILOT
 from gcs.link.codec import SourceCount
+from gcs.link.paths import LinkQuality
 from gcs.view import words
 from gcs.view.colours import Rgb, css
 from gcs.view.sightings import vehicle_colours, vehicle_names
 
-HEADINGS = ("Vehicle", "Last heard", "Quality", "Received", "Lost", "Sent")
+HEADINGS = ("Vehicle", "Last heard", "Quality", "Round trip", "Links", "Signing", "Received", "Lost", "Sent")
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,19 @@ def _cells(desk: Desk, sysid: int, now_s: float) -> tuple[str, ...]:
     return (
         f'<i class="{age_tone.value}">{escape(age)}</i>',
         f'<i class="{tone.value}">{escape(quality)}</i>',
+        _round_trip(desk.station.quality(sysid)),
+        f"{len(desk.station.routes.live_paths(sysid, desk.station.now_s)) or words.NOTHING}",
+        words.NOTHING if desk.player else escape(desk.station.codec.signing.trust(sysid).value.lower()),
         f"{count.received}",
         f"{count.lost}",
         f"{desk.station.sent.get(sysid, 0)}",
     )
+
+
+def _round_trip(best: LinkQuality | None) -> str:
+    if best is None or best.round_trip_s is None:
+        return words.NOTHING
+    return f"{1e3 * best.round_trip_s:.0f}<small> ms</small>"
 
 
 def _render(row: _Row) -> str:

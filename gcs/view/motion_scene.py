@@ -12,19 +12,29 @@ import viser
 
 from gcs.desk import Desk
 from gcs.flight.trails import Trails
-from gcs.view import shapes
-from gcs.view.colours import Rgb, faded, vivid
-from gcs.view.lines import AHEAD, CHUNK, AheadLine, FleetTrails, SealedLine, SealedLines, thinned, ways_ahead
+from gcs.view.colours import Rgb, vivid
+from gcs.view.lines import (
+    AHEAD,
+    CHUNK,
+    AheadLine,
+    FleetTrails,
+    SealedLine,
+    SealedLines,
+    joined_where,
+    thinned,
+    ways_ahead,
+)
 from gcs.view.sightings import Sighting
 from gcs.view.theme import DARK, Theme
+from gcs.view.vehicle_scene import MANY
 
 Array = npt.NDArray[np.float64]
 
 TRAIL_PX, AHEAD_PX = 2.5, 5.0
 TOLERANCE_SHARE = 0.5
 """By how much a thinned trail may be off, of its points' spacing."""
-MANY, SLOWER = 30, 2
-"""In a fleet with more vehicles than this, what lies ahead is sent at every second update."""
+SLOWER = 2
+"""In a large fleet, what lies ahead is sent at every second update."""
 
 
 class MotionScene:
@@ -59,8 +69,7 @@ class MotionScene:
             return
         positions_m = np.array([sighting.position_m for sighting in seen])
         by_sysid = self._trails.by_sysid
-        for index, points_m in self._past.take([by_sysid.get(sysid) for sysid in order]):
-            self._seal(points_m, self._colour(seen[index]))
+        self._seal(self._past.take([by_sysid.get(sysid) for sysid in order]))
         self._send_batch()
         self._tails.points = self._past.segments(positions_m).astype(np.float32)
         self._updates += 1
@@ -81,14 +90,21 @@ class MotionScene:
             handle.remove()
         self._sealed, self._lines, self._batch_sent = {}, SealedLines(), True
         self._drawn, self._past = [sighting.sysid for sighting in seen], FleetTrails(len(seen), self._spacing_m)
-        self._tails = self._live("/fleet/tails", CHUNK, [self._colour(s) for s in seen], TRAIL_PX)
+        self._colours = [self._theme.line_behind(vivid(sighting.colour)) for sighting in seen]
+        self._tails = self._live("/fleet/tails", CHUNK, self._colours, TRAIL_PX)
         self._ahead = self._live(
-            "/fleet/ahead", AHEAD, [faded(vivid(s.colour), self._theme.ahead, 0.2) for s in seen], AHEAD_PX
+            "/fleet/ahead", AHEAD, [self._theme.line_ahead(vivid(s.colour)) for s in seen], AHEAD_PX
         )
         self._batch = self._line("/trails/newest", self._lines.batch, self._lines.colours, visible=False)
 
-    def _seal(self, points_m: Array, colour: Rgb) -> None:
-        new, gone = self._lines.add(shapes.polyline(thinned(points_m, self._spacing_m * TOLERANCE_SHARE)), colour)
+    def _seal(self, chunks: Sequence[tuple[int, Array]]) -> None:
+        """Seal chunks of trails, given with the index of their vehicle."""
+        if not chunks:
+            return
+        chunks_m = np.array([points_m for _, points_m in chunks])
+        segments, of_chunk = joined_where(chunks_m, thinned(chunks_m, self._spacing_m * TOLERANCE_SHARE))
+        own = np.array([self._colours[index] for index, _ in chunks], dtype=np.uint8)
+        new, gone = self._lines.add(segments, own[of_chunk])
         for line in gone:
             self._sealed.pop(line.name).remove()
         for line in new:
@@ -119,6 +135,3 @@ class MotionScene:
         return self._scene.add_line_segments(
             name, nowhere, tints, thickness=width_px, thickness_units="screen", visible=bool(own)
         )
-
-    def _colour(self, sighting: Sighting) -> Rgb:
-        return faded(vivid(sighting.colour), self._theme.shade, 0.2)

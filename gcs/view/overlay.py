@@ -6,6 +6,7 @@ The server knows each browser's camera, so it says where everything stands, in p
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from html import escape
 
 import numpy as np
@@ -27,6 +28,7 @@ RINGS_OF_MANY = 0
 """In a large fleet a tag without room near its vehicle is left out."""
 CORNER_PX = (210.0, 128.0)
 """The upper right corner belongs to compass, scale bar and legend."""
+NO_ROOM = np.full(2, np.nan)
 BAR_PX = 120.0
 """The scale bar is at most this long."""
 TARGET = "target"
@@ -62,6 +64,7 @@ class Overlay:
 
     def __init__(self) -> None:
         self._stood: dict[str, Array] = {}
+        self._offsets = np.zeros((0, 2))
         self._settled: tuple[list[int], list[str]] = ([], [])
         self._renders = 0
 
@@ -79,46 +82,58 @@ class Overlay:
         sizes = np.array([_size_px(tags[i], text) for i, text in zip(shown, details, strict=True)]).reshape(-1, 2)
         self._renders += 1
         keys = [tags[index].key for index in shown]
-        if (shown, keys) != self._settled or self._renders % (SETTLE_MANY if brief else SETTLE) == 0:
+        due = self._renders % (SETTLE_MANY if brief else SETTLE) == 0
+        if brief and not due and (shown, keys) != self._settled and self._stood:
+            self._settled = (shown, keys)  # who has come into the picture of a large fleet gets a tag next time
+            self._offsets = np.array([self._stood.get(key, NO_ROOM) for key in keys]).reshape(-1, 2)
+        elif due or (shown, keys) != self._settled:
             self._settled = (shown, keys)
             spans = np.array([tags[index].span_px for index in shown])
             self._settle(keys, pixels[shown], sizes, spans, lens, rings=RINGS_OF_MANY if brief else RINGS)
-        offsets = [self._stood[key] for key in keys]
-        told = [
-            _tag(tags[index], text, pixels[index], offset, size)
-            for index, text, offset, size in zip(shown, details, offsets, sizes, strict=True)
-        ]
-        stems = "".join(stem for stem, _ in told)
-        return f"<svg>{stems}</svg>" + "".join(label for _, label in told)
+        anchors = pixels[shown]
+        stems = _stems([tags[index] for index in shown], anchors, self._offsets, sizes)
+        labels = []
+        for index, text, (x, y) in zip(shown, details, (anchors + self._offsets).tolist(), strict=True):
+            if x == x:  # not a number: there was no room
+                tag = tags[index]
+                before, after = _label(tag.name, text, tag.colour, tag.look, tag.selected)
+                labels.append(f"{before}{x:.0f}px;top:{y:.0f}px{after}")
+        return f"<svg>{stems}</svg>{''.join(labels)}"
 
     def _settle(
         self, keys: Sequence[str], pixels: Array, sizes: Array, spans: Array, lens: Lens, *, rings: int
     ) -> None:
         """Choose anew where each tag stands; in between they go along with what they name."""
-        before = np.array([self._stood.get(key, np.full(2, np.nan)) for key in keys]).reshape(-1, 2)
+        before = np.array([self._stood.get(key, NO_ROOM) for key in keys]).reshape(-1, 2)
         corner = (lens.width_px - CORNER_PX[0], 0.0, float(lens.width_px), CORNER_PX[1])
         picture = (lens.width_px, lens.height_px)
-        offsets = place(pixels, sizes, spans, picture, before, rings=rings, kept_free_px=[corner])
-        self._stood = dict(zip(keys, offsets, strict=True))
+        self._offsets = place(pixels, sizes, spans, picture, before, rings=rings, kept_free_px=[corner])
+        self._stood = dict(zip(keys, self._offsets, strict=True))
 
 
-def _tag(tag: Tag, details: str, anchor: Array, offset: Array, size: Array) -> tuple[str, str]:
-    """The stem and the tag; neither where there is no room, but a ring around what is selected in any case."""
-    colour = css(tag.colour)
-    ring = tag.span_px * 0.62
-    mark = f'<circle cx="{anchor[0]:.0f}" cy="{anchor[1]:.0f}" r="{ring:.0f}"/>' if tag.selected else ""
-    if math.isnan(offset[0]):
-        return mark, ""
-    x, y = anchor + offset
-    far = abs(offset[1]) > (tag.span_px + size[1]) / 2 + 8.0
-    edge = y - np.sign(offset[1]) * size[1] / 2
-    stem = f'<line x1="{anchor[0]:.0f}" y1="{anchor[1]:.0f}" x2="{x:.0f}" y2="{edge:.0f}" stroke="{colour}"/>'
+@lru_cache(maxsize=4096)
+def _label(name: str, details: str, colour: Rgb, look: str, selected: bool) -> tuple[str, str]:
+    """A tag's HTML before and after the pixel where it stands, which alone changes all the time."""
     told = f"<span>{escape(details)}</span>" if details else ""
-    look = f"{tag.look} sel" if tag.selected else tag.look
-    return mark + (stem if far else ""), (
-        f'<div class="tag {look}" style="left:{x:.0f}px;top:{y:.0f}px;--own:{colour}">'
-        f"<b>{escape(tag.name)}</b>{told}</div>"
-    )
+    look = f"{look} sel" if selected else look
+    return f'<div class="tag {look}" style="left:', f';--own:{css(colour)}"><b>{escape(name)}</b>{told}</div>'
+
+
+def _stems(tags: Sequence[Tag], anchors: Array, offsets: Array, sizes: Array) -> str:
+    """Stems of the tags that stand away from what they name, and rings around what is selected."""
+    spans = np.array([tag.span_px for tag in tags])
+    far = np.abs(offsets[:, 1]) > (spans + sizes[:, 1]) / 2 + 8.0
+    marks = []
+    for index in np.flatnonzero(far | np.array([tag.selected for tag in tags], dtype=bool)).tolist():
+        tag, (across, down) = tags[index], anchors[index].tolist()
+        if tag.selected:
+            marks.append(f'<circle cx="{across:.0f}" cy="{down:.0f}" r="{tag.span_px * 0.62:.0f}"/>')
+        if far[index]:
+            x, y = anchors[index] + offsets[index]
+            edge = y - np.sign(offsets[index, 1]) * sizes[index, 1] / 2
+            line = f'x1="{across:.0f}" y1="{down:.0f}" x2="{x:.0f}" y2="{edge:.0f}"'
+            marks.append(f'<line {line} stroke="{css(tag.colour)}"/>')
+    return "".join(marks)
 
 
 def _size_px(tag: Tag, details: str) -> tuple[float, float]:

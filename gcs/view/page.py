@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from gcs.desk import Desk
+from gcs.desk import Desk, Details, Intent
+from gcs.desk.intents import NewMission
 from gcs.view import legend, words
 from gcs.view.aiming import Aiming
 from gcs.view.browser import Browser
@@ -16,6 +17,7 @@ from gcs.view.cameras import Cameras
 from gcs.view.colours import BRAND, TARGET, Tone
 from gcs.view.editing_panel import EditingPanel
 from gcs.view.motion_scene import MotionScene
+from gcs.view.observed_scene import ObservedScene
 from gcs.view.overlay import Tag
 from gcs.view.panels import Panels, Press
 from gcs.view.plan_scene import PlanScene
@@ -26,6 +28,7 @@ from gcs.view.theme import DARK, LIGHT, Theme
 from gcs.view.vehicle_scene import MANY, least_span_px
 from gcs.view.world_scene import OnPick, WorldScene, diagonal_m
 from missions.mission import Mission
+from missions.mission_file import to_yaml
 
 Array = npt.NDArray[np.float64]
 
@@ -67,7 +70,6 @@ class Page:
         self._draw_scene()
         self._panels = Panels(server, desk, lambda client: self._aiming.begin(client), self._views())
         self._aiming = Aiming(
-            server,
             desk,
             self._panels.presses,
             lambda: self._panels.selected,
@@ -81,7 +83,7 @@ class Page:
         self._replay = ReplayPanel(server.gui, desk.player) if desk.player is not None else None
         self._editing: EditingPanel | None = None
         if self._world is not None and desk.mission is not None and desk.player is None:
-            self._editing = EditingPanel(server, desk.mission, self._show_draft)
+            self._editing = EditingPanel(server, desk.mission, self._show_draft, self._load_draft)
         self._browsers = Browsers(server, self._greet)
         self._use(DARK)
 
@@ -96,19 +98,24 @@ class Page:
         self._seen = sightings(self._desk)
         if len(self._seen) > fleet_before:
             self._frame_fleet()
-        with self._server.atomic():
+        with self._server.atomic():  # around everything: what it sends is packed by another thread, from its end on
             self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
             if now_s >= self._next_tell_s:
                 self._next_tell_s = now_s + (TELL_OF_MANY_S if len(self._seen) > MANY else TELL_INTERVAL_S)
-                self._desk.observe(shown_s)
-                self._seating.update()
-                self._show_plan()
-                self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
-                self._panels.update(self._seen, shown_s)
-        places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
-        tags = self._tags if len(self._tags) == len(places_m) else []
-        self._browsers.update(self._seen, tags, places_m[: len(tags)])
+                self._tell(shown_s)
+            places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
+            tags = self._tags if len(self._tags) == len(places_m) else []
+            self._browsers.update(self._seen, tags, places_m[: len(tags)])
+
+    def _tell(self, shown_s: float) -> None:
+        """Bring up to date what is read, not watched."""
+        self._desk.observe(shown_s)
+        self._seating.update()
+        self._show_plan()
+        self._observed.update(self._desk.station.fleet.observed, shown_s)
+        self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
+        self._panels.update(self._seen, shown_s)
 
     def _is_another(self, mission: Mission | None) -> bool:
         """Whether a mission is drawn elsewise than the one that is shown; a moved origin changes nothing."""
@@ -138,6 +145,7 @@ class Page:
         self._targets_m: list[Array] = []
         self._size_m = self._draw_surroundings()
         self._plan = PlanScene(scene, self._size_m * POINT_SHARE)
+        self._observed = ObservedScene(scene)
         self._motion = MotionScene(scene, max(LEAST_TRAIL_SPACING_M, self._size_m * TRAIL_SPACING_SHARE))
 
     def _legend(self) -> str:
@@ -156,7 +164,8 @@ class Page:
         _light(self._server.scene, theme)
         if self._world is None:
             _draw_plain(self._server.scene, theme)
-        self._motion.use(theme)
+        for drawn in (self._motion, self._plan, self._observed):
+            drawn.use(theme)
         self._browsers.use(theme)
 
     def _show_draft(self, mission: Mission, on_pick: OnPick | None) -> None:
@@ -164,6 +173,13 @@ class Page:
         assert self._world is not None
         self._world.show(mission, on_pick)
         self._targets_m = [np.array(target.position_m) for target in mission.targets]
+
+    def _load_draft(self, draft: Mission, client: viser.ClientHandle) -> None:
+        """Ask for a draft to be loaded as if it were a file."""
+        name = f"{draft.name}.yaml"
+        self._panels.presses.ask(
+            Intent.LOAD, client, Details(new=NewMission(draft, name, to_yaml(draft).encode())), sysids=()
+        )
 
     def _pick(self, sysid: int, joins: bool) -> None:
         """A vehicle was clicked; called in a thread of viser."""

@@ -16,6 +16,7 @@ from gcs.view.link_panel import LinkPanel
 from gcs.view.plots_panel import PlotsPanel
 from gcs.view.presses import Presses, visitor_key
 from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
+from gcs.view.vehicle_scene import MANY
 from missions.mission import Mission
 
 PANEL_PX, FLEET_PX, EDGE_PX = 330, 1000, 14
@@ -47,7 +48,8 @@ class Panels:
         self.presses = Presses(desk, lambda: self.selected)
         self._commands = CommandPanel(server.gui, desk, self.presses, on_go_to)
         self._choices: dict[str, list[int]] = {"All (0)": []}
-        self._looked_up_s = -math.inf
+        self._looked_up_s = self._table_s = -math.inf
+        self._table_picked: set[int] = set()
         server.gui.main_panel.dock_left()
         server.gui.main_panel.set_width(PANEL_PX)
         self._style()
@@ -95,7 +97,7 @@ class Panels:
         self._alerts.content = alert_list.render(desk.observations.alerts)
         self._take_command.visible = len(desk.seat.present) > 1 or desk.seat.holder is None
         self._reasons.content = mission_card.render_reasons(self._commands.update(sorted(self.selected)))
-        self._fleet.content = fleet_table.render(fleet_table.rows(desk, seen, self.picked_out, now_s))
+        self._show_table(seen, now_s)
         self._plots.update(sorted(self.picked_out), now_s)
         names = vehicle_names(desk)
         by_name = {names[sysid]: colour for sysid, colour in vehicle_colours(names).items()}
@@ -104,6 +106,14 @@ class Panels:
         if abs(now_s - self._looked_up_s) > LOOKED_UP_INTERVAL_S:
             self._looked_up_s = now_s
             self._look_up(now_s)
+
+    def _show_table(self, seen: list[Sighting], now_s: float) -> None:
+        """The fleet table: a large one once a second, but at once when others are selected."""
+        picked_out, aged_s = self.picked_out, abs(now_s - self._table_s)
+        if len(seen) > MANY and picked_out == self._table_picked and aged_s < LOOKED_UP_INTERVAL_S:
+            return
+        self._table_s, self._table_picked = now_s, picked_out
+        self._fleet.content = fleet_table.render(fleet_table.rows(self._desk, seen, picked_out, now_s))
 
     def _look_up(self, now_s: float) -> None:
         """What is behind other tabs."""

@@ -7,7 +7,8 @@ import viser
 
 from gcs.planner.plan import FleetPlan
 from gcs.view import shapes
-from gcs.view.colours import Rgb, faded, vivid
+from gcs.view.colours import Rgb, vivid
+from gcs.view.theme import DARK, Theme
 
 CURVE_PX = 1.5
 MOST_SEGMENTS = 300
@@ -25,6 +26,12 @@ class PlanScene:
     def __init__(self, scene: viser.SceneApi, point_m: float) -> None:
         self._scene, self._point_m = scene, point_m
         self._plan: FleetPlan | None = None
+        self._theme = DARK
+
+    def use(self, theme: Theme) -> None:
+        """Draw plans for a dark or a light page from now on."""
+        if theme is not self._theme:
+            self._theme, self._plan = theme, None
 
     def show(self, plan: FleetPlan | None, by_sysid: Mapping[int, Rgb]) -> bool:
         """Draw a plan unless it is the one that is drawn already; whether it was new."""
@@ -33,7 +40,7 @@ class PlanScene:
         self._plan = plan
         curves, tints, points, colours = [], [], [], []
         for part in plan.vehicles:
-            own = np.array(faded(vivid(by_sysid[part.sysid]), share=0.35), np.uint8)
+            own = np.array(self._theme.line_planned(vivid(by_sysid[part.sysid])), np.uint8)
             step = max(1, len(part.curve_m) // MOST_SEGMENTS)
             curve = shapes.polyline(np.concatenate((part.curve_m[:-1:step], part.curve_m[-1:])))
             curves.append(curve)

@@ -36,6 +36,8 @@ class PlotsPanel:
             return
         self._next_s = now_s + INTERVAL_S
         shown = (picked_out or list(vehicle_names(self._desk)))[:MOST_VEHICLES]
+        if not shown:
+            return
         if shown != self._drawn:
             self._build(shown)
         for quantity, plot in self._plots.items():

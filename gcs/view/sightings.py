@@ -1,21 +1,21 @@
 """The fleet as it is drawn: who is where, in the frame of the page; pure."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from gcs.desk import Desk
 from gcs.fleet.vehicle_state import VehicleState
+from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.view.colours import Rgb, vehicle_colour
 from missions.frames import LocalFrame, quaternion_enu_from_flu
 
 Array = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Sighting:
+class Sighting(NamedTuple):
     """One vehicle that has a place.
 
     Args:
@@ -62,11 +62,13 @@ def sightings(desk: Desk) -> list[Sighting]:
     """All vehicles that have told where they are, in the fleet's order; none before there is a frame."""
     frame, names = frame_of(desk), vehicle_names(desk)
     colours = vehicle_colours(names)
-    placed = [(state, state.place) for sysid in names if (state := desk.vehicles.get(sysid)) is not None]
+    vehicles = desk.vehicles
+    placed = [(state, state.place) for sysid in names if (state := vehicles.get(sysid)) is not None]
     seen = [(state, place) for state, place in placed if place is not None]
     if frame is None or not seen:
         return []
-    offsets_m = np.array([_ground_offset_m(desk, state.sysid) for state, _ in seen])
+    parts = desk.flight.vehicles if desk.flight is not None else {}
+    offsets_m = np.array([_ground_offset_m(parts.get(state.sysid)) for state, _ in seen])
     geodetic = np.array([(p.latitude_deg, p.longitude_deg, p.altitude_amsl_m) for _, p in seen]).T
     positions_m = frame.enu(geodetic[0], geodetic[1], geodetic[2] - offsets_m)
     rotations = quaternion_enu_from_flu(np.array([state.attitude_wxyz for state, _ in seen]))
@@ -76,6 +78,5 @@ def sightings(desk: Desk) -> list[Sighting]:
     ]
 
 
-def _ground_offset_m(desk: Desk, sysid: int) -> float:
-    part = desk.flight.vehicles.get(sysid) if desk.flight is not None else None
+def _ground_offset_m(part: VehicleFlight | None) -> float:
     return part.monitor.ground_offset_m if part is not None else 0.0

@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
-from gcs.view.colours import Rgb
+from gcs.view.colours import Rgb, faded
+
+AHEAD_SHARE, BEHIND_SHARE, PLANNED_SHARE = 0.2, 0.2, 0.35
+"""How far the lines of a vehicle are from its own colour."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,20 @@ class Theme:
     ahead: Rgb
     """What the line ahead of a vehicle tends to ..."""
     shade: Rgb
-    """... and the line behind it."""
+    """... and the lines behind it and of its plan."""
+    observed: Rgb
+
+    def line_ahead(self, vehicle: Rgb) -> Rgb:
+        """Of what a vehicle of this colour flies next."""
+        return faded(vehicle, self.ahead, AHEAD_SHARE)
+
+    def line_behind(self, vehicle: Rgb) -> Rgb:
+        """Of what it has flown."""
+        return faded(vehicle, self.shade, BEHIND_SHARE)
+
+    def line_planned(self, vehicle: Rgb) -> Rgb:
+        """Of what the cloud has planned for it."""
+        return faded(vehicle, self.shade, PLANNED_SHARE)
 
 
 DARK = Theme(
@@ -55,6 +71,7 @@ DARK = Theme(
     sun=2.0,
     ahead=(255, 255, 255),
     shade=(58, 68, 86),
+    observed=(255, 120, 214),
 )
 
 LIGHT = Theme(
@@ -77,4 +94,5 @@ LIGHT = Theme(
     sun=1.6,
     ahead=(0, 0, 0),
     shade=(20, 30, 50),
+    observed=(176, 24, 124),
 )

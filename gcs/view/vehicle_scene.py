@@ -22,6 +22,8 @@ SPAN_M = 0.55
 LEAST_SPAN_PX, LEAST_SPAN_OF_MANY_PX = 46.0, 24.0
 """A vehicle is drawn larger than it is where it would be smaller than this in the picture."""
 MANY = 30
+GROWTH = 1.05
+"""Sizes are powers of this, so that they are seldom sent anew."""
 
 
 def least_span_px(count: int) -> float:
@@ -33,7 +35,8 @@ def spans_m(positions_m: Array, lens: Lens | None) -> Array:
     """(n,) sizes at which vehicles at (n, 3) positions are drawn."""
     if lens is None:
         return np.full(len(positions_m), SPAN_M)
-    return np.maximum(SPAN_M, least_span_px(len(positions_m)) * lens.metres_per_pixel(positions_m))
+    wanted_m = np.maximum(SPAN_M, least_span_px(len(positions_m)) * lens.metres_per_pixel(positions_m))
+    return SPAN_M * GROWTH ** np.round(np.log(wanted_m / SPAN_M) / np.log(GROWTH))
 
 
 class VehicleScene:
@@ -51,6 +54,7 @@ class VehicleScene:
     ) -> None:
         self._scene, self._ground_height_m, self._on_pick, self._theme = scene, ground_height_m, on_pick, theme
         self._drawn: list[int] = []
+        self._sizes_m = np.zeros(0)
         self._batches: list[viser.BatchedMeshHandle] = []
         self._stems: viser.LineSegmentsHandle | None = None
 
@@ -68,15 +72,17 @@ class VehicleScene:
         if [sighting.sysid for sighting in seen] != self._drawn:
             self._build(seen, positions_m, rotations, sizes_m)
         places, turns, sizes = (values.astype(np.float32) for values in (positions_m, rotations, sizes_m))
+        resized, self._sizes_m = not np.array_equal(sizes_m, self._sizes_m), sizes_m
         for batch in self._batches:
             batch.batched_positions = places
             batch.batched_wxyzs = turns
-            batch.batched_scales = sizes
+            if resized:
+                batch.batched_scales = sizes
         assert self._stems is not None
         self._stems.points = self._stem_lines(positions_m).astype(np.float32)
 
     def _build(self, seen: Sequence[Sighting], positions_m: Array, rotations: Array, sizes_m: Array) -> None:
-        self._drawn = [sighting.sysid for sighting in seen]
+        self._drawn, self._sizes_m = [sighting.sysid for sighting in seen], sizes_m
         own = np.array([colours.vivid(sighting.colour) for sighting in seen], dtype=np.uint8)
         grey = np.tile(np.array(self._theme.airframe, np.uint8), (len(seen), 1))
         quadrotor = shapes.quadrotor()

@@ -5,6 +5,7 @@ import math
 from gcs.dialect import Mode
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight.monitor import Phase
+from gcs.security.signing import Trust
 from gcs.view.colours import Tone
 from missions.tunnel import CompanionState, Reason
 
@@ -20,6 +21,11 @@ _COMPANION_TONES = {
     CompanionState.HOLDING: Tone.WARN,
     CompanionState.RELEASED: Tone.WARN,
     CompanionState.FAILED: Tone.BAD,
+}
+_TRUST_WORDS = {
+    Trust.SIGNED: ("signed", Tone.GOOD),
+    Trust.PENDING: ("key pending", Tone.WARN),
+    Trust.UNSIGNED: ("no", Tone.WARN),
 }
 _PHASE_TONES = {
     Phase.WAITING: Tone.QUIET,
@@ -95,6 +101,11 @@ def quality_words(quality: float) -> tuple[str, Tone]:
         return NOTHING, Tone.QUIET
     tone = Tone.BAD if quality < 0.5 else Tone.WARN if quality < 0.8 else Tone.GOOD
     return f"{5 * round(20 * quality)} %", tone
+
+
+def trust_words(trust: Trust) -> tuple[str, Tone]:
+    """Whether a vehicle's frames are signed."""
+    return _TRUST_WORDS[trust]
 
 
 def duration_words(seconds: float) -> str:

@@ -53,6 +53,8 @@ class ScriptedVehicle:
     clock_s: float = 10.0
     commands: list[tuple[int, float, float]] = field(default_factory=list)
     """Of every command received: its number, param2 and param3."""
+    sent_to_m: list[np.ndarray] = field(default_factory=list)
+    """Places of Go to received, ENU."""
 
     def fly_on(self, seconds: float) -> None:
         """Let time pass; along the plan only while the companion steers."""
@@ -91,6 +93,7 @@ class ScriptedVehicle:
             self.companion = CompanionState.RELEASED if self.companion is not None else None
         if message.command == mavlink.MAV_CMD_DO_REPOSITION:
             self.mode = Mode.HOLD
+            self.sent_to_m.append(self.frame.enu(message.x * 1e-7, message.y * 1e-7, message.z))
         if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             self.armed = message.param1 > 0.5
         ack = mavlink.MAVLink_command_ack_message(message.command, mavlink.MAV_RESULT_ACCEPTED)
@@ -172,10 +175,14 @@ class ScriptedDesk:
     Args:
         mission: its name, or None for watching `watched` vehicles without a mission.
         watched: see there.
+
+    Attributes:
+        pace: of what is flown while it is watched: slow motion, since a browser that draws in software is slow to
+            begin; 0 if what is tested depends on where the vehicles are.
     """
 
     def __init__(self, mission: str | None, watched: int = 0) -> None:
-        self.planning_s = 0.0
+        self.planning_s, self.pace = 0.0, 0.1
         self.air = Air()
         self.events = EventLog(time.monotonic)
         self.desk = Desk(self.air.station, self.events, simulated=True)
@@ -239,11 +246,12 @@ class ScriptedDesk:
         assert self.desk.trails is not None
         self.desk.trails.sample(self.air.station.fleet, {})
 
-    async def run(self, interval_s: float = 0.1, *, pace: float = 0.1) -> None:
-        """Fly on until cancelled: in slow motion, since a browser that draws in software is slow to begin."""
+    async def run(self, interval_s: float = 0.1) -> None:
+        """Fly on until cancelled."""
         while True:
-            for vehicle in self.vehicles:
-                vehicle.fly_on(interval_s * pace)
+            if self.pace > 0.0:
+                for vehicle in self.vehicles:
+                    vehicle.fly_on(interval_s * self.pace)
             self.say()
             self.sample()
             for part in self.desk.flight.vehicles.values() if self.desk.flight else ():

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.async_api import Browser, Locator, Page, expect
 
@@ -15,7 +16,7 @@ from tests.browser.conftest import LARGE, OpenPage, serving, tab
 from tests.browser.ground_station import gcs_fly
 from tests.browser.loopback import HOST, answering, free_port
 from tests.browser.scripted_desk import ScriptedDesk
-from tests.browser.watching import OUT, button, choose, row, until
+from tests.browser.watching import OUT, button, choose, pixel_of, row, until
 
 pytestmark = pytest.mark.browser
 
@@ -70,8 +71,6 @@ async def test_the_indoor_mission_is_loaded_planned_and_flown_from_the_page_alon
         async with tab(browser, port, LARGE) as page:
             await load(page, "indoor")
             await step_by_step(page)
-            for vehicle in ("alpha", "bravo"):  # its companion has taken over
-                await expect(row(page, vehicle)).to_contain_text("Offboard", timeout=FLIGHT_TIMEOUT_MS)
             await press(page, "Hold")
             await expect(row(page, "alpha")).to_contain_text("interrupted", timeout=FLIGHT_TIMEOUT_MS)
             await page.reload()
@@ -133,8 +132,9 @@ async def test_missions_are_loaded_from_the_list_and_from_files(open_page: OpenP
 
 
 async def hovering() -> ScriptedDesk:
-    """Two vehicles on their way, then held in the air."""
+    """Two vehicles on their way; they stay where they are while the page is tried."""
     scripted = ScriptedDesk("indoor")
+    scripted.pace = 0.0
     await scripted.begin(at_s=[2.0, 2.0])
     return scripted
 
@@ -181,13 +181,15 @@ async def test_vehicles_are_sent_to_where_the_operator_clicks(open_page: OpenPag
     page = await open_page(scripted, LARGE)
     await choose(page, "Orders to", "alpha")
     await press(page, "Go to")
-    await page.wait_for_timeout(500)
-    await page.mouse.click(640, 560)  # on the floor before the crate
+    await expect(page.get_by_text("Click at the place")).to_be_visible()
+    place_m = np.array([12.0, 3.0, 0.0])  # on the floor, beside the crate
+    await page.mouse.click(*await pixel_of(page, place_m))
     await until(lambda: len(scripted.desk.orders.orders) > 0, "the order is there")
     order = scripted.desk.orders.orders[-1]
     await until(lambda: order.state.value != "pending", "it has been answered")
     assert (order.who, order.state.value) == ("alpha", "accepted"), order.reason
-    assert mavlink.MAV_CMD_DO_REPOSITION in {number for number, _, _ in scripted.vehicles[0].commands}
+    height_m = scripted.mission.takeoff_height_m
+    np.testing.assert_allclose(scripted.vehicles[0].sent_to_m[-1], place_m + [0.0, 0.0, height_m], atol=0.1)
     assert scripted.vehicles[1].commands == []
 
 

@@ -58,6 +58,22 @@ async def camera_position_m(page: Page) -> np.ndarray:
     return transforms.SO3(np.array([w, x, y, z])).inverse() @ np.array(place)
 
 
+async def pixel_of(page: Page, place_m: np.ndarray) -> tuple[float, float]:
+    """Where in the browser's window its camera shows a place, ENU."""
+    w, x, y, z = await page.evaluate("window.__viserSceneTree.getState()[''].wxyz")
+    place = transforms.SO3(np.array([w, x, y, z])) @ place_m
+    across, down = await page.evaluate(
+        """place => {
+            const { camera, canvas } = window.__viserMutable;
+            const { x, y } = camera.position.clone().fromArray(place).project(camera);
+            const { left, top, width, height } = canvas.getBoundingClientRect();
+            return [left + (1 + x) / 2 * width, top + (1 - y) / 2 * height];
+        }""",
+        place.tolist(),
+    )
+    return across, down
+
+
 async def pixels(page: Page) -> bytes:
     """What the browser's canvas shows, RGBA."""
     values = await page.evaluate(

@@ -1,7 +1,6 @@
 """The receive paths that are fuzzed; each takes hostile traffic and says now and then whether it is still sound."""
 
 import asyncio
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 import numpy as np
@@ -18,7 +17,9 @@ from gcs.microservices.verified_upload import VerifiedUpload
 from gcs.station import Station
 from sitl.microservices.outbox import Link
 from sitl.simulator import Simulator
-from tests.benchmarks.link.conversation import waypoints
+from tests.benchmarks.link.conditions import waypoints
+from tests.fuzz import file_targets
+from tests.fuzz.target import Target
 from tests.fuzz.traffic import Traffic
 
 GCS_READS = tuple(
@@ -32,22 +33,6 @@ SITL_READS = tuple(
     MISSION_REQUEST_INT MISSION_ACK MISSION_CLEAR_ALL MISSION_SET_CURRENT TIMESYNC PING MANUAL_CONTROL
     HEARTBEAT""".split()  # noqa: SIM905 - as above
 )
-
-
-class Target(ABC):
-    """One receive path; add a new one to `TARGETS`."""
-
-    @abstractmethod
-    def feed(self) -> None:
-        """Take in some hostile traffic; raises if anything gets out of the receive path."""
-
-    @abstractmethod
-    def check(self) -> None:
-        """Raise AssertionError if something is no longer sound."""
-
-    def close(self) -> None:
-        """Leave nothing running."""
-        return
 
 
 class _Wire:
@@ -159,5 +144,10 @@ TARGETS: dict[str, Callable[[np.random.Generator], Target]] = {
     "ground station": GroundStationTarget,
     "streams": StreamTarget,
     "simulator": SimulatorTarget,
+    "plan files": file_targets.PlanFileTarget,
+    "recordings": file_targets.RecordingTarget,
+    "parameter files": file_targets.ParameterFileTarget,
+    "key rings": file_targets.KeyRingTarget,
+    "journals": file_targets.JournalTarget,
 }
-"""Name -> builder; others' receive paths (companion, TUNNEL, lidar, files) are added here."""
+"""Name -> builder."""

@@ -79,6 +79,22 @@ def test_held_and_resumed_with_their_companions_they_arrive_as_well():
     assert fly(hold_and_resume, PlanningMode.END_CLOUD).flight.success
 
 
+def test_a_hold_that_comes_before_the_companions_have_taken_over_stops_them_all_the_same():
+    crept_m: list[float] = []
+
+    async def hold_at_once(operator: Operator) -> None:
+        begun_m = [operator.desk.position_m(sysid) for sysid in BOTH]
+        assert operator.desk.why_not(Intent.HOLD, BOTH) is None
+        await operator.order(Intent.HOLD)
+        await operator.until(lambda: operator.desk.why_not(Intent.RESUME, BOTH) is None, 15.0)
+        held_m = [operator.desk.position_m(sysid) for sysid in BOTH]
+        crept_m.extend(float(np.linalg.norm(held - begun)) for held, begun in zip(held_m, begun_m, strict=True))
+        await operator.order(Intent.RESUME)
+
+    assert fly(hold_at_once, PlanningMode.END_CLOUD).flight.success
+    assert max(crept_m) < 2.0
+
+
 def test_one_is_sent_to_a_place_at_its_height_and_landed_there_while_the_other_flies_on():
     place_m = (3.0, 4.0, 2.0)
     reached: list[float] = []

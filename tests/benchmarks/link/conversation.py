@@ -18,6 +18,7 @@ from sitl.autopilot.reports import Severity
 from sitl.microservices.mission_transfer_server import MissionTransferServer, MissionType
 from sitl.microservices.outbox import Link, Outbox, Sender
 from sitl.wire import FrameReader
+from tests.benchmarks.link.conditions import ONE_WAY_DELAY_S
 
 SERVER_TICK_S = 0.02
 UP, DOWN, TICK = range(3)
@@ -46,7 +47,7 @@ class LinkModel:
     """The same both ways: share lost, one-way delay [s] and its variation [s], and outages (from, until) [s]."""
 
     loss: float = 0.0
-    delay_s: float = 0.05
+    delay_s: float = ONE_WAY_DELAY_S
     jitter_s: float = 0.0
     outages_s: tuple[tuple[float, float], ...] = ()
 
@@ -93,19 +94,8 @@ class Conversation:
             self._transmit(DOWN, answer)
 
     def _serve(self, frame: bytes) -> None:
-        server, now_s = self._server, self.now_s
         for message in self._reader.read(frame):
-            match message.get_type():
-                case "MISSION_COUNT":
-                    server.receive_count(message, SENDER, now_s)
-                case "MISSION_ITEM_INT":
-                    server.receive_item_int(message, SENDER, now_s)
-                case "MISSION_REQUEST_LIST":
-                    server.receive_request_list(message, SENDER, now_s)
-                case "MISSION_REQUEST_INT":
-                    server.receive_request_int(message, SENDER, now_s)
-                case "MISSION_ACK":
-                    server.receive_ack(message, SENDER, now_s)
+            serve(self._server, message, self.now_s)
 
     def _send(self, messages: list[Any]) -> None:
         for message in messages:
@@ -123,15 +113,20 @@ class Conversation:
         heapq.heappush(self._events, (at_s, next(self._order), what, frame))
 
 
+def serve(server: MissionTransferServer, message: Any, now_s: float) -> None:
+    """Hand a ground station's message to a vehicle's mission server, if it is for that."""
+    match message.get_type():
+        case "MISSION_COUNT":
+            server.receive_count(message, SENDER, now_s)
+        case "MISSION_ITEM_INT":
+            server.receive_item_int(message, SENDER, now_s)
+        case "MISSION_REQUEST_LIST":
+            server.receive_request_list(message, SENDER, now_s)
+        case "MISSION_REQUEST_INT":
+            server.receive_request_int(message, SENDER, now_s)
+        case "MISSION_ACK":
+            server.receive_ack(message, SENDER, now_s)
+
+
 def _silent(severity: Severity, text: str) -> None:
     """Texts are not what is measured."""
-
-
-def waypoints(n: int, rng: np.random.Generator) -> list[MissionItem]:
-    """A mission of `n` items that differ in everything that is flown."""
-    places = rng.integers(-10_000, 10_000, (n, 2))
-    heights = rng.uniform(480.0, 520.0, n).astype(np.float32)
-    return [
-        MissionItem(command=16, param2=0.5, x=473_977_418 + int(e), y=85_455_939 + int(n_), z=float(h))
-        for (e, n_), h in zip(places, heights, strict=True)
-    ]

@@ -13,10 +13,11 @@ from gcs.flight import upload
 from gcs.link.opening import open_link
 from gcs.link.url import parse_link_url
 from gcs.station import Station
-from tests.benchmarks.link.conversation import waypoints
+from tests.benchmarks.link.conditions import USUAL_ITEMS, waypoints
 from tests.integration.sitl_process import free_instance_base
 
-N_VEHICLES, N_ITEMS = 100, 100
+N_VEHICLES = 100
+FLEETS, FLEET_LOSSES = (1, 10, 100), (0.0, 0.1)
 GCS_PORT, FIRST_PORT = 14550, 18570
 WINDOW_S = 10.0
 MOST_CPU, LONGEST_UPLOAD_S, OLDEST_P99_S = 1.0, 20.0, 0.3
@@ -49,10 +50,16 @@ class FleetFigures:
         return out
 
 
-def measure(n_vehicles: int = N_VEHICLES) -> FleetFigures:
-    """The light fleet in a process of its own, over real UDP with 50 ms each way."""
+def measure(n_vehicles: int = N_VEHICLES, loss: float = 0.0, window_s: float = WINDOW_S) -> FleetFigures:
+    """The light fleet in a process of its own, over real UDP with 50 ms each way.
+
+    Args:
+        n_vehicles: in the fleet.
+        loss: share of frames that get lost, both ways.
+        window_s: how long is listened before the uploads begin.
+    """
     base = free_instance_base()
-    arguments = [str(n_vehicles), str(FIRST_PORT + base), str(GCS_PORT + base)]
+    arguments = [str(n_vehicles), str(FIRST_PORT + base), str(GCS_PORT + base), str(loss)]
     command = [sys.executable, "-m", "tests.benchmarks.link.light_fleet", *arguments]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as vehicles:
         assert vehicles.stdin is not None
@@ -61,12 +68,12 @@ def measure(n_vehicles: int = N_VEHICLES) -> FleetFigures:
             line = vehicles.stdout.readline()
             if line != "ready\n":
                 raise RuntimeError(f"expected the light fleet to be ready, it said {line!r}")
-            return asyncio.run(_measure(n_vehicles, base))
+            return asyncio.run(_measure(n_vehicles, base, window_s))
         finally:
             vehicles.stdin.close()
 
 
-async def _measure(n_vehicles: int, base: int) -> FleetFigures:
+async def _measure(n_vehicles: int, base: int, window_s: float) -> FleetFigures:
     station = Station()
     url = parse_link_url(f"udpin://127.0.0.1:{GCS_PORT + base}")
     connection = await open_link(url, station.receive, lambda _: None)
@@ -75,7 +82,7 @@ async def _measure(n_vehicles: int, base: int) -> FleetFigures:
     await station.wait_until(lambda: len(fleet) == n_vehicles, 30.0, "not all vehicles heard")
     await asyncio.sleep(2.0)
     messages, cpu_s, begun_s = _received(station), time.process_time(), time.monotonic()
-    ages_s = await _ages_s(station, WINDOW_S)
+    ages_s = await _ages_s(station, window_s)
     took_s = time.monotonic() - begun_s
     cpu_share = (time.process_time() - cpu_s) / took_s
     messages_hz = (_received(station) - messages) / took_s
@@ -89,7 +96,7 @@ async def _measure(n_vehicles: int, base: int) -> FleetFigures:
 
 async def _store(station: Station, sysid: int) -> bool:
     try:
-        await upload.store(station, sysid, waypoints(N_ITEMS, np.random.default_rng(sysid)))
+        await upload.store(station, sysid, waypoints(USUAL_ITEMS, np.random.default_rng(sysid)))
     except GcsError:
         return False
     return True

@@ -1,21 +1,22 @@
 """Many vehicles as a ground station sees them, without the physics: telemetry stamped with this machine's clock, and
 the simulator's own mission server, each 50 ms late. So the ground station is measured, not how fast a simulator flies.
 
-`python -m tests.benchmarks.link.light_fleet VEHICLES FIRST_PORT GCS_PORT` runs until its standard input is closed.
+`python -m tests.benchmarks.link.light_fleet VEHICLES FIRST_PORT GCS_PORT LOSS` runs until its standard input is closed.
 """
 
 import asyncio
+import random
 import socket
 import sys
 from typing import Any
 
 from gcs.dialect import AUTOPILOT
 from sitl.microservices.mission_transfer_server import MissionTransferServer
-from sitl.microservices.outbox import Link, Outbox, Sender
+from sitl.microservices.outbox import Link, Outbox
 from sitl.wire import LAYOUTS, FrameReader, FrameWriter
-from tests.benchmarks.link.conversation import SERVER_TICK_S, Shelf
+from tests.benchmarks.link.conditions import ONE_WAY_DELAY_S
+from tests.benchmarks.link.conversation import SERVER_TICK_S, Shelf, serve
 
-DELAY_S = 0.05
 TICK_S = 0.1
 """State comes at 10 Hz."""
 SLOWER = (("VFR_HUD", 3), ("SYS_STATUS", 5), ("EXTENDED_SYS_STATE", 2), ("MISSION_CURRENT", 2), ("HEARTBEAT", 10))
@@ -25,9 +26,10 @@ TWICE = ("ATTITUDE", "LOCAL_POSITION_NED")
 
 
 class LightVehicle:
-    """One vehicle behind one socket."""
+    """One vehicle behind one socket; a share of the frames gets lost, both ways."""
 
-    def __init__(self, sysid: int, port: int, gcs_port: int) -> None:
+    def __init__(self, sysid: int, port: int, gcs_port: int, loss: float) -> None:
+        self._loss, self._rng = loss, random.Random(sysid)
         self._gcs = ("127.0.0.1", gcs_port)
         self._loop = asyncio.get_running_loop()
         self._writer, self._outbox, self._reader = FrameWriter(sysid, AUTOPILOT), Outbox(sysid), FrameReader()
@@ -63,28 +65,23 @@ class LightVehicle:
                 datagram = self._end.recv(2048)
             except OSError:
                 return
-            self._loop.call_later(DELAY_S, self._serve, datagram)
+            if self._rng.random() >= self._loss:
+                self._loop.call_later(ONE_WAY_DELAY_S, self._serve, datagram)
 
     def _serve(self, datagram: bytes) -> None:
-        server, now_s, sender = self._server, self._loop.time(), Sender(Link.GROUND, 255, 190)
-        handlers = {
-            "MISSION_COUNT": server.receive_count,
-            "MISSION_ITEM_INT": server.receive_item_int,
-            "MISSION_REQUEST_LIST": server.receive_request_list,
-            "MISSION_REQUEST_INT": server.receive_request_int,
-            "MISSION_ACK": server.receive_ack,
-        }
         for message in self._reader.read(datagram):
-            if (handler := handlers.get(message.get_type())) is not None:
-                handler(message, sender, now_s)
+            serve(self._server, message, self._loop.time())
         self._answer()
 
     def _answer(self) -> None:
         for _, frame in self._outbox.take():
-            self._loop.call_later(DELAY_S, self._end.sendto, frame, self._gcs)
+            if self._rng.random() >= self._loss:
+                self._loop.call_later(ONE_WAY_DELAY_S, self._end.sendto, frame, self._gcs)
 
     def _send(self, name: str, values: tuple[Any, ...]) -> None:
-        self._end.sendto(self._writer.frame(LAYOUTS[name], values), self._gcs)
+        frame = self._writer.frame(LAYOUTS[name], values)
+        if self._rng.random() >= self._loss:
+            self._end.sendto(frame, self._gcs)
 
 
 _VALUES: dict[str, tuple[Any, ...]] = {
@@ -96,9 +93,9 @@ _VALUES: dict[str, tuple[Any, ...]] = {
 }
 
 
-async def run(n_vehicles: int, first_port: int, gcs_port: int) -> None:
+async def run(n_vehicles: int, first_port: int, gcs_port: int, loss: float) -> None:
     """Send and serve until cancelled."""
-    vehicles = [LightVehicle(i + 1, first_port + i, gcs_port) for i in range(n_vehicles)]
+    vehicles = [LightVehicle(i + 1, first_port + i, gcs_port, loss) for i in range(n_vehicles)]
     print("ready", flush=True)
     loop = asyncio.get_running_loop()
     due_s, ticks = loop.time(), 0
@@ -115,7 +112,8 @@ async def run(n_vehicles: int, first_port: int, gcs_port: int) -> None:
 
 async def main() -> None:
     """Run until standard input is closed."""
-    running = asyncio.create_task(run(*(int(argument) for argument in sys.argv[1:4])))
+    n_vehicles, first_port, gcs_port = (int(argument) for argument in sys.argv[1:4])
+    running = asyncio.create_task(run(n_vehicles, first_port, gcs_port, float(sys.argv[4])))
     await asyncio.to_thread(sys.stdin.read)
     running.cancel()
 

@@ -2,14 +2,13 @@
 
 import argparse
 import os
-import platform
-import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from rich.console import Console
 
+from tests.benchmarks.command_line import machine, seed_range
 from tests.benchmarks.onboard.flights import fly
 from tests.benchmarks.onboard.single import Part, single_vehicles
 from tests.benchmarks.onboard.worlds import COURSES
@@ -23,15 +22,14 @@ WARM_UP_SEED = 10_000
 def main() -> int:
     """0 if every required figure is met, 1 if not, 2 for bad input."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.onboard", description=__doc__)
-    parser.add_argument("--seeds", type=_seeds, default=range(50), metavar="A:B", help="from A to B - 1")
+    parser.add_argument("--seeds", type=seed_range, default=range(50), metavar="A:B", help="from A to B - 1")
     parser.add_argument("--quick", action="store_true", help="the first two seeds alone")
     parser.add_argument("--only", choices=PARTS, action="append", help="this part; repeatable")
     parser.add_argument("--world", choices=COURSES, action="append", help="this world; repeatable")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables there, too")
     given = parser.parse_args()
     results = Results(Console(width=None if sys.stdout.isatty() else 200))
-    results.note(f"{_processor()}, {os.cpu_count()} cores, Python {platform.python_version()}")
-    results.note(f"load average at the start {os.getloadavg()[0]:.1f}")
+    results.note(machine())
     results.console.print("compiling, warming up")
     for name in ("room", "dynamic"):
         fly(COURSES[name](WARM_UP_SEED))
@@ -47,18 +45,6 @@ def main() -> int:
     for figure in results.missed:
         results.console.print(f"MISSED  {figure}", style="bold red", highlight=False)
     return 1 if results.missed else 0
-
-
-def _seeds(text: str) -> range:
-    found = re.fullmatch(r"(\d+):(\d+)", text)
-    if found is None or int(found[1]) >= int(found[2]):
-        raise argparse.ArgumentTypeError(f"expected A:B with A < B, found {text!r}")
-    return range(int(found[1]), int(found[2]))
-
-
-def _processor() -> str:
-    names = re.findall(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(encoding="ascii"), re.MULTILINE)
-    return names[0] if names else platform.processor()
 
 
 if __name__ == "__main__":

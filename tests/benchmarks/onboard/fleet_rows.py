@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from tests.benchmarks.command_line import seed_range
 from tests.benchmarks.onboard.fleets import FLEETS, LINKS, fly_together
 from tests.benchmarks.onboard.flights import Score
 from tests.benchmarks.onboard.worlds import LIMITS
@@ -65,7 +66,7 @@ def _successes(flights: list[list[Score]]) -> int:
 def main() -> int:
     """0 if every required figure is met, 1 if not."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.onboard.fleet_rows", description=__doc__)
-    parser.add_argument("--seeds", type=_seeds, default=range(10), metavar="A:B", help="from A to B - 1")
+    parser.add_argument("--seeds", type=seed_range, default=range(10), metavar="A:B", help="from A to B - 1")
     parser.add_argument("--only", choices=FLEETS, action="append", help="this fleet; repeatable")
     parser.add_argument("--link", choices=LINKS, action="append", help="this link; repeatable")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables there, too")
@@ -76,13 +77,6 @@ def main() -> int:
     if given.markdown is not None:
         given.markdown.write_text(results.markdown())
     return 1 if results.missed else 0
-
-
-def _seeds(text: str) -> range:
-    first, separator, end = text.partition(":")
-    if not (separator and first.isdecimal() and end.isdecimal() and int(first) < int(end)):
-        raise argparse.ArgumentTypeError(f"expected A:B with A < B, found {text!r}")
-    return range(int(first), int(end))
 
 
 if __name__ == "__main__":

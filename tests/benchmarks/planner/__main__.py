@@ -2,8 +2,6 @@
 
 import argparse
 import os
-import platform
-import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from gcs.planner import compile_kernels
+from tests.benchmarks.command_line import machine, seed_range
 from tests.benchmarks.planner import contests
 from tests.benchmarks.planner.contests import Part
 from tests.benchmarks.planner.figures import Results
@@ -31,13 +30,13 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 def main() -> int:
     """0 if every required figure is met, 1 if not, 2 for bad input."""
     parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.planner", description=__doc__)
-    parser.add_argument("--seeds", type=_seeds, default=range(30), metavar="A:B", help="from A to B - 1")
+    parser.add_argument("--seeds", type=seed_range, default=range(30), metavar="A:B", help="from A to B - 1")
     parser.add_argument("--quick", action="store_true", help="two seeds and a few worlds, less than two minutes")
     parser.add_argument("--only", choices=PARTS, action="append", help="this part; repeatable")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the tables there, too")
     given = parser.parse_args()
     results = Results(Console(width=None if sys.stdout.isatty() else 160))
-    results.note(_machine())
+    results.note(machine())
     results.console.print("compiling, warming up")
     _warm_up()
     scope = quick(given.seeds) if given.quick else Scope(given.seeds)
@@ -58,20 +57,6 @@ def _in_one_thread() -> None:
     """Begin again with linear algebra that makes no threads, unless that is so already: they cost CPU time."""
     if any(os.environ.get(name) != "1" for name in THREADS):
         os.execve(sys.executable, sys.orig_argv, {**os.environ, **dict.fromkeys(THREADS, "1")})
-
-
-def _seeds(text: str) -> range:
-    first, separator, end = text.partition(":")
-    if not (separator and first.isdecimal() and end.isdecimal() and int(first) < int(end)):
-        raise argparse.ArgumentTypeError(f"expected A:B with A < B, found {text!r}")
-    return range(int(first), int(end))
-
-
-def _machine() -> str:
-    """What the times were measured on; with more load than cores, CPU times are longer than they should be."""
-    match = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    model = match[1] if match else platform.processor()
-    return f"{model}, {os.cpu_count()} cores, load average {os.getloadavg()[0]:.1f}, Python {platform.python_version()}"
 
 
 def _warm_up() -> None:

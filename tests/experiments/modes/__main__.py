@@ -7,20 +7,19 @@ from pathlib import Path
 from rich.console import Console
 
 from gcs.experiments.command import Order, conduct
+from tests.benchmarks.command_line import seed_range
 from tests.experiments.modes.experiment import EXPERIMENT, shortfalls
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", default="0:10", help="A:B, from A up to but not including B")
+    parser.add_argument("--seeds", type=seed_range, default=range(10), metavar="A:B", help="from A to B - 1")
     parser.add_argument("--output", type=Path, default=Path("out/experiments"))
     options = parser.parse_args()
-    first, _, end = options.seeds.partition(":")
-    if not (first.isdecimal() and end.isdecimal() and int(first) < int(end)):
-        parser.error(f"--seeds {options.seeds}: expected A:B with A < B")
-    order = Order("modes", int(end) - int(first), int(first), None, options.output)
+    seeds: range = options.seeds
+    order = Order("modes", len(seeds), seeds.start, None, options.output)
     console = Console(highlight=False, soft_wrap=True)
-    rows = conduct(EXPERIMENT, order, console, f"make experiment-modes SEEDS={options.seeds}")
+    rows = conduct(EXPERIMENT, order, console, f"make experiment-modes SEEDS={seeds.start}:{seeds.stop}")
     missed = shortfalls(rows)
     for line in missed:
         console.print(line, markup=False)

@@ -1,5 +1,8 @@
 """Three modes in worlds that are not as mapped, over three links: flown in process, and judged by the truth."""
 
+import os
+import platform
+import time
 from collections.abc import Sequence
 from itertools import product as combinations
 from pathlib import Path
@@ -21,6 +24,8 @@ MODE_NAMES = {mode.value: mode for mode in MODES}
 MISLED = (Difference.MISSING, Difference.MOVED, Difference.DEAD_END)
 SLACK = 0.02
 """End-cloud may be this much less successful than the better of the other two."""
+FLUKES = 0.1
+"""A world that misleads may let so many of those through that it is meant for."""
 
 
 def runs(seeds: Sequence[int]) -> list[Run]:
@@ -38,6 +43,7 @@ def work(run: Run) -> Row:
     flown = scenario(Difference[run.text("world")], Link[run.text("link")], run.number("seed"))
     mode = MODE_NAMES[run.text("mode")]
     system = WholeSystem(flown.mission, mode, seed=run.number("seed"), truth_mission=flown.truth)
+    begun_s = time.perf_counter()
     report = system.fly()
     ways = [flight.in_flight() for flight in system.flown().values()]
     clearance_m = min(min_clearance_m(flown.truth, way) for way in ways)
@@ -53,6 +59,7 @@ def work(run: Run) -> Row:
         "cloud_replans": report.cloud_replans,
         "swap_s": report.swap_s_p50,
         "reason": report.reason,
+        "wall_s": round(time.perf_counter() - begun_s, 1),
     }
 
 
@@ -71,6 +78,10 @@ def shortfalls(rows: Sequence[Row]) -> list[str]:
             found.append(f"{world.value}, {link.value}: end-cloud {both:.0%}, the better of the other two {better:.0%}")
         if link is Link.GOOD and world in MISLED and both < 1.0:
             found.append(f"{world.value}, {link.value}: end-cloud {both:.0%}, required is 100 %")
+        if world in MISLED and rates[PlanningMode.CLOUD] > FLUKES:
+            found.append(f"{world.value}, {link.value}: cloud alone arrives in {rates[PlanningMode.CLOUD]:.0%}")
+        if (world, link) == (Difference.DEAD_END, Link.GOOD) and rates[PlanningMode.ONBOARD] > FLUKES:
+            found.append(f"{world.value}: onboard alone gets out of {rates[PlanningMode.ONBOARD]:.0%}: it is none")
     found += [f"{_name(row)}: failed without a reason" for row in rows if not row["success"] and not row["reason"]]
     return found
 
@@ -93,15 +104,19 @@ def summary(rows: Sequence[Row]) -> str:
     lines = [_line(rows, *cell) for cell in combinations(Difference, Link, MODES)]
     preface = (
         "Two vehicles in the paper's room, its obstacles moved by the seed; a pillar that the map lacks or has "
-        "elsewhere stands on the way that the cloud plans; the dead end is a pocket of three walls. All flights in "
-        "process on a virtual clock, judged by the simulator's truth. Median [quartiles]; clearance is that of the "
+        "elsewhere stands on the way that the cloud plans; the dead end is a hall with an unmapped blind alley, deeper "
+        "than a local planner remembers and searches. All flights in process on a virtual clock, judged by the "
+        "simulator's truth. Median [quartiles]; clearance is that of the "
         "centre, a vehicle has 0.2 m radius; kB are those of the ground link, both ways, both vehicles."
     )
     missed = shortfalls(rows)
     verdict = "All promises kept." if not missed else "Not as promised:\n\n" + "\n".join(f"* {line}" for line in missed)
     failed = [f"* {_name(row)}: {row['reason']}" for row in rows if not row["success"]]
     reasons = "## Flights that failed\n\n" + "\n".join(failed) if failed else "No flight failed."
-    return "\n\n".join([preface, table(head, lines), verdict, "![modes](modes.png)", reasons])
+    took_min = sum(numbers(rows, "wall_s")) / 60.0
+    machine = f"{len(rows)} flights in {took_min:.0f} minutes of one core: {platform.processor() or platform.machine()}"
+    machine += f", {os.cpu_count()} cores, Python {platform.python_version()}."
+    return "\n\n".join([preface, machine, table(head, lines), verdict, "![modes](modes.png)", reasons])
 
 
 def figures(rows: Sequence[Row], directory: Path) -> list[str]:
@@ -162,6 +177,7 @@ EXPERIMENT = Experiment(
         "cloud_replans",
         "swap_s",
         "reason",
+        "wall_s",
     ),
     runs=runs,
     work=work,

@@ -17,7 +17,7 @@ from companion.settings import CompanionSettings, PlanningMode, Reserve
 from missions.frames import AutopilotFrame, GeodeticPoint
 from missions.mission import Mission, load_mission
 from missions.mission_items import MissionItem, Track, encode_track
-from missions.trajectory import Trajectory
+from missions.trajectory import Motion, Trajectory
 
 INDOOR = load_mission("indoor")
 GCS = events.Sender(255, 190)
@@ -47,6 +47,9 @@ class StraightPlanner:
 
     def lay_guide(self, track: Track, index: int, from_m: np.ndarray) -> Guide:
         return lay_guide(track, index, from_m, INDOOR.onboard.horizon_m, self.limits)
+
+    def join_track(self, track: Track, index: int, start: Motion) -> Guide:
+        return self.lay_guide(track, index, start.position_m)
 
     def outlook(self, trajectory: Trajectory, now_s: float) -> Outlook:
         return Outlook(np.inf, np.inf) if self.clear else Outlook(now_s, now_s)

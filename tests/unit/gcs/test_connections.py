@@ -1,6 +1,7 @@
 """Real sockets and a pseudo-terminal: connections come, go, and come again; budgets are kept."""
 
 import asyncio
+import itertools
 import os
 import pty
 import socket
@@ -10,10 +11,11 @@ import pytest
 
 from gcs.dialect import mavlink
 from gcs.errors import UsageError
-from gcs.link import serial_line, streams
+from gcs.link import retries, streams
 from gcs.link.connection import OpenConnection
 from gcs.link.frames import FrameSplitter
 from gcs.link.opening import open_link
+from gcs.link.retries import Retries
 from gcs.link.shaper import LONGEST_WAIT_S, Shaper, Urgency, fitting_rates
 from gcs.link.url import LinkUrl, Scheme, parse_link_url
 from tests.unit.gcs.messages import frame_of
@@ -53,8 +55,7 @@ def free_port(kind: int = socket.SOCK_STREAM) -> int:
 
 @pytest.fixture(autouse=True)
 def short_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(streams, "FIRST_PAUSE_S", 0.01)
-    monkeypatch.setattr(serial_line, "FIRST_PAUSE_S", 0.01)
+    monkeypatch.setattr(retries, "FIRST_PAUSE_S", 0.01)
 
 
 # ------------------------------------------------------------------ connection strings
@@ -100,6 +101,30 @@ def test_a_damaged_frame_does_not_take_the_next_one_with_it():
     assert FrameSplitter().feed(bytes(damaged) + FRAMES[1] + FRAMES[2]) == FRAMES[1:]
 
 
+def test_noise_that_looks_like_an_unknown_message_takes_no_true_frame_with_it():
+    noise = bytes([0xFD, 30, 0, 0, 0, 9, 9]) + (12_345_678).to_bytes(3, "little")
+    assert FrameSplitter().feed(noise + b"".join(FRAMES)) == FRAMES
+    unknown = noise + bytes(32)
+    assert FrameSplitter().feed(unknown + FRAMES[0] + unknown) == [unknown, FRAMES[0], unknown]
+
+
+def test_mavlink_1_is_not_looked_for_in_a_stream():
+    sender = mavlink.MAVLink(None, 1, 1)
+    splitter = FrameSplitter()
+    assert splitter.feed(bytes(HEARTBEAT.pack(sender, force_mavlink1=True)) + FRAMES[0] + b"\xfe" * 1000) == FRAMES[:1]
+    assert splitter.skipped_bytes == 1017
+
+
+def test_a_connection_that_does_not_hold_is_tried_ever_later_and_a_good_one_soon_again():
+    tries = Retries()
+    assert [tries.take() for _ in range(12)][-1] == retries.LONGEST_PAUSE_S
+    tries.held(0.1)
+    assert not tries.is_first
+    tries.held(60.0)
+    assert tries.is_first
+    assert tries.take() == retries.FIRST_PAUSE_S
+
+
 async def test_a_tcp_client_connects_as_soon_as_there_is_a_server_and_again_when_it_is_lost():
     ground, vehicle, port = Ground(), Ground(), free_port()
     client = await ground.open(f"tcp://127.0.0.1:{port}")
@@ -131,6 +156,44 @@ async def test_a_tcp_server_keeps_its_clients_apart():
     assert ends[0].frames == []
     for connection in (*clients, server):
         connection.close()
+
+
+async def test_who_only_keeps_a_place_makes_room_for_the_next_tcp_client(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(streams, "MOST_CLIENTS", 2)
+    monkeypatch.setattr(streams, "IDLE_S", 0.2)
+    ground, port = Ground(), free_port()
+    server = await ground.open(f"tcpin://127.0.0.1:{port}")
+    ends = [await asyncio.open_connection("127.0.0.1", port) for _ in range(2)]
+    refused, closing = await asyncio.open_connection("127.0.0.1", port)
+    assert await refused.read(1) == b""
+    await asyncio.sleep(0.3)
+    ends[1][1].write(FRAMES[0])
+    await until(lambda: len(ground.frames) == 1)
+    ends.append(await asyncio.open_connection("127.0.0.1", port))
+    ends[2][1].write(FRAMES[1])
+    await until(lambda: len(ground.frames) == 2)
+    assert await ends[0][0].read(1) == b""
+    server.close()
+    for writer in [closing, *(end[1] for end in ends)]:
+        writer.close()
+
+
+async def test_a_flood_of_datagrams_leaves_everything_else_its_turn():
+    ground, port, loop = Ground(), free_port(socket.SOCK_DGRAM), asyncio.get_running_loop()
+    inward = await ground.open(f"udpin://127.0.0.1:{port}")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as flood:
+        for size in [60_000] * 20 + [0] * 3000:
+            flood.sendto(bytes(size), ("127.0.0.1", port))
+    taken: list[int] = []
+    while len(ground.frames) < 3020:
+        taken.append(len(ground.frames))
+        turn = loop.create_future()
+        loop.call_soon(turn.set_result, None)
+        await turn
+    inward.close()
+    assert max(later - earlier for earlier, later in itertools.pairwise(taken)) < 700
+    assert taken[1] < 20
+    assert max(map(len, ground.frames)) == 4096
 
 
 async def test_a_taken_port_is_named():

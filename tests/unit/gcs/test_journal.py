@@ -127,7 +127,9 @@ def test_a_journal_has_one_writer(folder: Path):
     assert left_in_flight(folder.parent, MISSION) == folder
 
 
-@pytest.mark.parametrize("data", [b"", b"\n\n", b"\xff\xfe\n", b'{"type": "began"}\n', b"[1, 2]\n", b"[" * 5000])
+@pytest.mark.parametrize(
+    "data", [b"", b"\n\n", b"\xff\xfe\n", b'{"type": "began"}\n', b"[1, 2]\n", b"[" * 5000, b'"\xf2"', b'{"a":' * 5000]
+)
 def test_what_is_no_journal_tells_nothing(tmp_path: Path, data: bytes):
     (tmp_path / JOURNAL_FILE).write_bytes(data)
     assert read_story(tmp_path / JOURNAL_FILE) is None

@@ -13,7 +13,8 @@ from gcs.microservices.mission_upload import MissionUpload
 from gcs.microservices.verified_upload import Stage, VerifiedUpload
 from sitl.autopilot.plan import Plan
 from sitl.microservices.mission_transfer_server import MissionType
-from tests.benchmarks.link.conversation import Conversation, LinkModel, waypoints
+from tests.benchmarks.link.conditions import waypoints
+from tests.benchmarks.link.conversation import Conversation, LinkModel
 from tests.unit.gcs.messages import from_autopilot
 
 PEER = (1, 1)

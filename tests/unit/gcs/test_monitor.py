@@ -5,7 +5,14 @@ import pytest
 
 from gcs.dialect import Mode
 from gcs.fleet.vehicle_state import LandedState, VehicleState
-from gcs.flight.monitor import COMPANION_SILENCE_S, TAKEOVER_GRACE_S, UNATTENDED_HOLD_S, Phase, VehicleMonitor
+from gcs.flight.monitor import (
+    COMPANION_SILENCE_S,
+    HOLD_AGAIN_S,
+    TAKEOVER_GRACE_S,
+    UNATTENDED_HOLD_S,
+    Phase,
+    VehicleMonitor,
+)
 from missions.mission import OnArrival, load_mission
 from missions.tunnel import CompanionState, CompanionStatus, Reason
 from tests.unit.gcs import messages as mav
@@ -140,7 +147,7 @@ def test_a_companion_that_restarted_has_lost_control():
 def test_a_pause_by_the_operator_is_no_loss_and_can_be_resumed():
     flight = Flight(unattended=False)
     flight.wait(5.0)
-    flight.monitor.paused_by_operator = True
+    flight.monitor.pause(flight.state, flight.now_s)
     flight.state.mode = Mode.HOLD
     flight.say(CompanionState.RELEASED, Reason.CONTROL_TAKEN)
     flight.wait(10.0)
@@ -226,5 +233,41 @@ def test_when_the_link_returns_the_companion_is_given_time_to_be_heard():
     flight.companion_alive = False  # the autopilot's telemetry is back first
     assert flight.wait(COMPANION_SILENCE_S - 0.2) == []
     flight.companion_alive = True
+    assert flight.wait(10.0) == []
+    assert flight.monitor.phase is Phase.FLYING
+
+
+def test_an_operators_hold_is_repeated_to_a_companion_that_takes_over_after_it():
+    flight = Flight(unattended=False)
+    flight.say(CompanionState.ENGAGING)
+    flight.state.mode = Mode.HOLD
+    flight.monitor.pause(flight.state, flight.now_s)
+    assert flight.wait(2.0) == []  # it holds, as was ordered
+    flight.state.mode = Mode.OFFBOARD
+    flight.say(CompanionState.FLYING)
+    assert flight.wait(0.3) == [Mode.HOLD]
+    assert flight.wait(2 * HOLD_AGAIN_S) == [Mode.HOLD, Mode.HOLD]  # as long as it has no effect
+    flight.state.mode = Mode.HOLD
+    flight.say(CompanionState.RELEASED, Reason.CONTROL_TAKEN)
+    assert flight.wait(10.0) == []
+    assert (flight.monitor.phase, flight.monitor.reason) == (Phase.INTERRUPTED, "paused by the operator")
+
+
+def test_a_hold_that_has_just_been_ordered_has_time_to_be_seen():
+    flight = Flight(unattended=False)
+    flight.wait(5.0)
+    flight.monitor.pause(flight.state, flight.now_s)
+    assert flight.wait(HOLD_AGAIN_S - 0.2) == []  # HEARTBEAT, with the mode, comes once a second
+
+
+def test_what_another_station_resumes_is_not_held_again():
+    flight = Flight(unattended=False)
+    flight.wait(5.0)
+    flight.monitor.pause(flight.state, flight.now_s)
+    flight.state.mode = Mode.HOLD
+    flight.say(CompanionState.RELEASED, Reason.CONTROL_TAKEN)
+    flight.wait(5.0)
+    flight.state.mode = Mode.OFFBOARD
+    flight.say(CompanionState.FLYING)
     assert flight.wait(10.0) == []
     assert flight.monitor.phase is Phase.FLYING

@@ -6,6 +6,7 @@ import pytest
 
 from gcs.dialect import mavlink
 from gcs.errors import ParameterError
+from gcs.microservices.parameter_client import ParameterExchange
 from gcs.microservices.parameter_fetch import HASH_CHECK, Parameter, ParameterFetch, ParameterSet
 from gcs.microservices.parameter_files import parameter_differences, read_parameters, write_parameters
 from sitl.microservices.outbox import Link
@@ -129,3 +130,40 @@ def test_other_components_are_left_out_and_bad_lines_named():
     assert read_parameters(text) == {"A_INT": Parameter(5, INT)}
     with pytest.raises(ParameterError, match=r"vehicle.params:2: expected system, component, name, value, type"):
         read_parameters("# x\n1\t1\tA_INT\tnan\t9\n", "vehicle.params")
+
+
+def test_files_of_mavproxy_and_mission_planner_are_read():
+    assert read_parameters("A_INT 5\nB_REAL,0.5\n") == {"A_INT": Parameter(5, INT), "B_REAL": Parameter(0.5, REAL)}
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "A 1e39",
+        f"A {'9' * 5000}",
+        "A 1_000",
+        "A \u0663",
+        "1 1 A 1.5 6",
+        "1 1 A 256 1",
+        "1 1 A 1 11",
+        "1 x A 1 6",
+        "A-B 1",
+    ],
+)
+def test_values_that_their_type_does_not_hold_are_refused(row: str):
+    with pytest.raises(ParameterError, match="x.params:1: expected system, component, name, value, type"):
+        read_parameters(row, "x.params")
+
+
+def test_a_parameter_that_stands_twice_in_a_file_is_refused():
+    with pytest.raises(ParameterError, match="x.params:2: A a second time"):
+        read_parameters("A 1\nA 2\n", "x.params")
+
+
+@pytest.mark.parametrize(("value", "kind"), [(0.5, INT), (2**31, INT), (2139095041, INT), (1e39, REAL)])
+def test_what_a_parameter_cannot_have_is_not_sent(value: float, kind: int):
+    exchange = ParameterExchange((1, 1), "A", new_value=value)
+    exchange.start(0.0)
+    with pytest.raises(ParameterError, match="vehicle 1: parameter A: .*; nothing was set"):
+        exchange.receive(frame_value("A", bytes(4), kind, 0), 0.1)
+    assert exchange.done

@@ -46,7 +46,20 @@ def test_a_flood_is_held_back_and_counted():
     shown = lines(texts, [said(f"text {number}") for number in range(1000)])
     assert len(shown) == MOST_PER_WINDOW
     assert texts.held_back == 1000 - MOST_PER_WINDOW
+    assert lines(texts, [said("Motor failure", severity=1)]) == ["Motor failure"]  # not held up by the chatter
     assert lines(texts, [said("after")], 3.0) == ["after"]
+
+
+def test_what_would_steer_a_terminal_or_turn_the_writing_around_is_replaced():
+    nasty = ["\x1b[2J\x1b[31mred", "end\r\nfake line", "bell\x07", "c1\x9b31m", "\u202eabc"]
+    shown = lines(StatusTexts(), [said(text) for text in nasty])
+    assert shown == ["�[2J�[31mred", "end��fake line", "bell�", "c1��31m", "���abc"]
+
+
+def test_many_missing_chunks_are_one_gap():
+    texts = StatusTexts()
+    assert lines(texts, [said("x" * 50, 7, 15)]) == []
+    assert [line.text for line in texts.overdue(2.0)] == ["[…]" + "x" * 50 + "[…]"]
 
 
 def test_chunks_of_ever_new_texts_are_not_kept_for_ever():

@@ -59,3 +59,14 @@ def test_blocks_that_have_no_place_in_the_message_are_not_sent():
         encode_block(a_block(index=(2**15, 0, 0)))
     with pytest.raises(ValueError, match="does not fit"):
         encode_block(OccupancyBlock((0, 0, 0), 0.0, 0, a_block().occupied))
+
+
+def test_blocks_hold_each_voxel_where_it_belongs():
+    voxels = np.random.default_rng(2).integers(-20, 20, (300, 3))
+    blocks = blocks_of(voxels)
+    assert blocks_of(voxels[:0]) == {}
+    assert {tuple(v) for v in voxels.tolist()} == {
+        tuple((BLOCK_VOXELS * np.array(index) + inside).tolist())
+        for index, occupied in blocks.items()
+        for inside in np.argwhere(occupied)
+    }

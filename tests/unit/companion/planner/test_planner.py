@@ -1,5 +1,6 @@
 """What the onboard planner promises: clear, within limits, from exactly the given state, to rest; and how it brakes."""
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from missions import obstacles
 from missions.mission import Mission
 from missions.mission_items import Track
 from missions.trajectory import Motion, Trajectory, at_rest
+from missions.world import World
 from tests.unit.companion.planner.problems import AROUND_THE_CRATE_M, INDOOR, TERRAIN, make_planner
 
 TRACK = Track(AROUND_THE_CRATE_M[1:], np.full(7, 3.0), tuple(range(1, 8)))
@@ -67,6 +69,26 @@ def test_from_anywhere_along_the_track_it_plans_a_trajectory_that_keeps_its_prom
     start, arc_m = random_state(rng)
     plan = make_planner(seed=seed).plan(request(start, arc_m))
     assert_keeps_its_promises(plan)
+
+
+@pytest.mark.parametrize("turn_deg", [60.0, 90.0, 135.0])
+@pytest.mark.parametrize("speed_m_s", [0.9, 1.6, 2.5])
+def test_at_speed_it_turns_to_a_track_that_leads_elsewhere(speed_m_s: float, turn_deg: float):
+    turn_rad = np.radians(turn_deg)
+    empty = msgspec.structs.replace(INDOOR, world=World(bounds=INDOOR.world.bounds))
+    start = Motion(np.array([8.0, 11.5, 1.5]), np.array([speed_m_s, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    to_m = start.position_m + 5.0 * np.array([np.cos(turn_rad), -np.sin(turn_rad), 0.0])
+    elsewhere = Track(to_m[None], np.array([3.0]))
+    for seed in range(5):
+        planner = make_planner(empty, seed=seed)
+        plan = planner.plan(PlanRequest(1, start, 50.0, planner.join_track(elsewhere, 0, start), 0.0))
+        assert_keeps_its_promises(plan, empty, planner)
+
+
+def test_who_runs_out_into_something_turns_at_once_instead():
+    start = Motion(np.array([1.0, 2.0, 1.5]), np.array([-2.0, 0.0, 0.0]), np.zeros(3))
+    guide = PLANNER.join_track(Track(np.array([[1.0, 9.0, 1.5]]), np.array([3.0])), 0, start)
+    assert guide.way.points_m[:, 0].min() == pytest.approx(1.0)
 
 
 def test_it_stays_near_the_track():

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from companion.planner.grid_search import way_around
-from companion.planner.guide import blocked_samples, lay_guide, lead_around, nearest_on
+from companion.planner.guide import blocked_samples, corner_speeds, lay_guide, lead_around, nearest_on, run_out
 from companion.planner.reference import LEG_SPEED, SPEED_CAP, TANGENT, Way, corner_speed, lay_reference, reach_speeds
 from companion.planner.spline_shape import sample_rows, spline_shape
 from missions import bspline, obstacles
 from missions.mission_items import Track
 from missions.time_law import arc_length, resample, speeds_along
-from missions.trajectory import Trajectory
+from missions.trajectory import Motion, Trajectory
 from missions.world import World
 from tests.unit.companion.planner.problems import (
     AROUND_THE_CRATE_M,
@@ -89,6 +89,36 @@ def test_progress_is_measured_along_the_guide():
 def test_legs_without_a_speed_are_flown_at_cruise_speed():
     guide = guide_from(START_M, track=Track(TARGET_M[None], np.array([np.nan])))
     assert guide.way.samples[:, LEG_SPEED].max() == pytest.approx(LIMITS.cruise_m_s)
+
+
+def test_sharp_corners_are_slow_and_straights_are_not():
+    square = np.array([[0.0, 0, 1], [5, 0, 1], [5, 5, 1]])
+    arcs = np.linspace(0.0, 10.0, 101)
+    points = np.array([square[0] + [min(a, 5.0), max(a - 5.0, 0.0), 0.0] for a in arcs])
+    speeds = corner_speeds(points, arcs, 0.9, LIMITS)
+    assert speeds[50] == pytest.approx(np.sqrt(0.85 * 2.0 / (np.pi / 2 / 0.9)), rel=1e-6)
+    assert speeds[20] > 100.0
+
+
+def test_on_a_circle_the_corner_speed_is_that_of_its_radius():
+    angle = np.linspace(0.0, 3.0, 400)
+    circle = np.column_stack((3.0 * np.cos(angle), 3.0 * np.sin(angle), np.ones(400)))
+    speeds = corner_speeds(circle, arc_length(circle), 0.9, LIMITS)
+    assert speeds[200] == pytest.approx(np.sqrt(0.85 * 2.0 * 3.0), rel=0.02)
+
+
+@pytest.mark.parametrize(("velocity_m_s", "runs_out"), [([2.5, 0, 0], True), ([0, 0, 0], False), ([0, 2.5, 0], False)])
+def test_who_is_fast_and_turns_sharply_runs_out_first(velocity_m_s: list[float], runs_out: bool):
+    north = Track(np.array([[3.0, 13.0, 1.5]]), np.array([3.0]))
+    start = Motion(np.array([3.0, 3.0, 1.5]), np.array(velocity_m_s, dtype=float), np.zeros(3))
+    over_m = run_out(north, 0, start, LIMITS)
+    assert (over_m is not None) is runs_out
+    if over_m is not None:
+        guide = lay_guide(north, 0, start.position_m, HORIZON_M, LIMITS, over_m)
+        np.testing.assert_allclose(over_m[1:], start.position_m[1:])
+        assert over_m[0] - 3.0 > (2.5**2 - 1.0) / (2.0 * 2.0), "it needs that much to brake"
+        assert np.linalg.norm(guide.way.points_m - over_m, axis=1).min() < 1e-9
+        np.testing.assert_allclose(guide.point(guide.track_arc_m[0]), north.points_m[0])
 
 
 # ----------------------------------------------------------------------------- detours
@@ -195,7 +225,7 @@ def test_a_way_that_lacks_a_little_distance_is_passed_farther_off_at_speed():
     assert reference.duration_s < 5.2
 
 
-def test_on_a_circle_the_corner_speed_is_that_of_its_radius():
+def test_on_a_circle_a_reference_has_the_speed_of_its_radius():
     angle = np.linspace(0.0, 2.0, 64)
     circle = np.column_stack((3.0 * np.cos(angle), 3.0 * np.sin(angle), np.ones(64)))
     for j in (0, 30, 63):

@@ -5,11 +5,13 @@ import asyncio
 import pytest
 
 from gcs.desk import Desk, Details, Intent
+from gcs.desk.desk import MOST_QUOTED
 from gcs.desk.intents import NewMission
 from gcs.desk.orders import OrderState
 from gcs.dialect import Mode
 from gcs.errors import CommandRefused
-from gcs.fleet.vehicle_state import LandedState
+from gcs.fleet.status_texts import StatusText
+from gcs.fleet.vehicle_state import LandedState, VehicleState
 from gcs.flight.monitor import Phase
 from gcs.planner.plan import FleetPlan
 from missions.faults import LinkFault, SimulatorFault
@@ -52,6 +54,28 @@ async def test_each_phase_has_its_orders_and_the_others_say_why_not(phase: Phase
         state.mode = Mode.OFFBOARD
     orders = [intent for intent in Intent if intent.concerns_vehicles and intent is not Intent.LINK]
     assert {intent for intent in orders if desk.why_not(intent, BOTH) is None} == possible
+
+
+async def test_a_flood_of_texts_is_held_back_and_an_emergency_is_not():
+    desk = await make_desk()
+    for sysid in range(1, 250):
+        state = desk.vehicles.setdefault(sysid, VehicleState(sysid))
+        state.texts.extend(StatusText(1.0, 6, f"chatter {number}") for number in range(20))
+    desk.vehicles[200].texts.append(StatusText(2.0, 1, "Motor failure"))
+    desk.collect_texts()
+    said = [event for event in desk.events.events if event.kind == "said"]
+    assert len(said) == MOST_QUOTED + 1
+    assert "Motor failure" in {event.text for event in said}
+
+
+async def test_who_holds_already_can_be_told_to_hold_only_while_its_companion_is_about_to_take_over():
+    desk = await make_desk()
+    put(desk, Phase.FLYING)
+    for state in desk.vehicles.values():
+        state.mode = Mode.HOLD
+    assert desk.why_not(Intent.HOLD, BOTH) is None
+    put(desk, Phase.HOVERING)
+    assert desk.why_not(Intent.HOLD, BOTH) == "already in hold"
 
 
 async def test_a_prepared_vehicle_can_be_armed_once_nothing_speaks_against_it():

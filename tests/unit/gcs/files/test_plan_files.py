@@ -7,6 +7,7 @@ import pytest
 
 from gcs.errors import BadFile
 from gcs.files.document import Circle, Place, PlanDocument, Polygon
+from gcs.files.kml import parse_kml
 from gcs.files.qgc_plan import format_plan, parse_plan
 from gcs.files.waypoints import format_waypoints, parse_waypoints
 from missions.mission_items import MissionItem
@@ -134,6 +135,12 @@ def test_what_cannot_be_flown_is_refused_with_place_and_reason(key: str, value: 
 def test_what_is_no_plan_is_refused(data: bytes):
     with pytest.raises(BadFile, match=r"^x\.plan: "):
         parse_plan(data, "x.plan")
+
+
+@pytest.mark.parametrize("encoding", ["UTN-8", "rot13", "cp037", "utf-7"])
+def test_kml_in_an_encoding_that_is_none_is_refused(encoding: str):
+    with pytest.raises(BadFile, match=r"^x\.kml: line \d+: expected"):
+        parse_kml(f'<?xml version="1.0" encoding="{encoding}"?><kml></kml>'.encode(), "x.kml")
 
 
 WPL = (

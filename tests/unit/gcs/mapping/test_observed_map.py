@@ -114,3 +114,15 @@ def test_a_wall_with_gaps_between_its_rays_becomes_few_boxes():
     observed = ObservedMap(BOUNDS)
     report(observed, 1, np.column_stack((east.ravel(), np.full(east.size, 7.05), up.ravel())))
     assert len(observed.boxes()) <= 4
+
+
+def test_the_distance_to_what_was_seen_is_that_to_its_voxels():
+    observed, rng = ObservedMap(BOUNDS), np.random.default_rng(3)
+    points_m = rng.uniform([1.0, 1.0, 0.5], [19.0, 14.0, 3.5], (500, 3))
+    assert np.all(np.isinf(observed.clearance(points_m)))
+    wall_m = np.column_stack((np.full(400, 8.0), rng.uniform(4.0, 9.0, 400), rng.uniform(0.1, 3.0, 400)))
+    report(observed, 1, wall_m)
+    spans = merged(observed.voxels) * 0.2
+    beside_m = np.maximum(np.maximum(spans[:, :3] - points_m[:, None], points_m[:, None] - spans[:, 3:]), 0.0)
+    np.testing.assert_allclose(observed.clearance(points_m), np.linalg.norm(beside_m, axis=2).min(axis=1), atol=1e-9)
+    np.testing.assert_allclose(observed.clearance(points_m[:1]), observed.clearance(points_m)[:1])

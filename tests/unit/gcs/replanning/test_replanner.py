@@ -111,7 +111,7 @@ def test_a_feasible_plan_around_a_block_is_flown_and_not_asked_for_again():
     observed, aloft = on_the_way(), part_way()
     replanner = Replanner(INDOOR, observed)
     plan = plan_mission(remaining_mission(INDOOR, aloft, observed.boxes()), seed=0)
-    assert replanner.judge(Cause.BLOCKED, plan, aloft, observed.changes, 10.0) == ""
+    assert replanner.judge(Cause.BLOCKED, plan, aloft, replanner.basis, 10.0) == ""
     assert replanner.look(part_way(plan, 0.0), 100.0) is None
 
 
@@ -120,7 +120,7 @@ def test_an_infeasible_plan_is_not_flown_and_is_tried_again_later():
     replanner = Replanner(INDOOR, observed)
     plan = plan_mission(remaining_mission(INDOOR, aloft, observed.boxes()), seed=0)
     impossible = type(plan)(**{**vars(plan), "feasible": False, "violations": ("no room",)})
-    assert replanner.judge(Cause.BLOCKED, impossible, aloft, observed.changes, 10.0) == "no room"
+    assert replanner.judge(Cause.BLOCKED, impossible, aloft, replanner.basis, 10.0) == "no room"
     assert replanner.look(aloft, 10.5) is None
     assert replanner.look(aloft, 11.1) is Cause.BLOCKED
 
@@ -130,7 +130,7 @@ def test_a_plan_that_is_hardly_better_is_not_worth_a_change():
     replanner = Replanner(INDOOR, observed)
     assert replanner.look(aloft, 10.0) is Cause.REVIEW
     plan = plan_mission(remaining_mission(INDOOR, aloft, observed.boxes()), seed=0)
-    assert "not materially better" in replanner.judge(Cause.REVIEW, plan, aloft, observed.changes, 10.0)
+    assert "not materially better" in replanner.judge(Cause.REVIEW, plan, aloft, replanner.basis, 10.0)
     assert replanner.look(aloft, 20.0) is None
 
 
@@ -138,7 +138,7 @@ def test_the_map_is_reviewed_again_when_it_has_changed_but_not_too_often():
     observed, aloft = aside(), part_way()
     replanner = Replanner(INDOOR, observed)
     plan = plan_mission(remaining_mission(INDOOR, aloft, observed.boxes()), seed=0)
-    replanner.judge(Cause.REVIEW, plan, aloft, observed.changes, 10.0)
+    replanner.judge(Cause.REVIEW, plan, aloft, replanner.basis, 10.0)
     pillar(observed, np.array([4.0, 14.5]))
     assert replanner.look(aloft, 12.0) is None
     assert replanner.look(aloft, 15.1) is Cause.REVIEW
@@ -149,7 +149,7 @@ def test_a_plan_that_is_much_better_is_flown():
     replanner = Replanner(INDOOR, observed)
     slow = [Aloft(each.sysid, each.position_m, each.targets, each.curve_m, 60.0) for each in aloft]
     plan = plan_mission(remaining_mission(INDOOR, aloft, observed.boxes()), seed=0)
-    assert replanner.judge(Cause.REVIEW, plan, slow, observed.changes, 10.0) == ""
+    assert replanner.judge(Cause.REVIEW, plan, slow, replanner.basis, 10.0) == ""
 
 
 def test_an_edit_by_the_operator_is_a_cause_at_once():
@@ -158,3 +158,34 @@ def test_an_edit_by_the_operator_is_a_cause_at_once():
     replanner.edit(msgspec.structs.replace(INDOOR, targets=(moved, *INDOOR.targets[1:])))
     assert replanner.look(part_way(), 10.0) is Cause.EDITED
     assert replanner.mission.targets[0].position_m == pytest.approx((18.0, 9.0, 1.5))
+
+
+def test_an_edit_that_comes_while_a_plan_is_made_is_not_lost():
+    observed, aloft = on_the_way(), part_way()
+    replanner = Replanner(INDOOR, observed)
+    basis = replanner.basis
+    plan = plan_mission(remaining_mission(INDOOR, aloft, observed.boxes()), seed=0)
+    replanner.edit(INDOOR)
+    assert "meanwhile" in replanner.judge(Cause.BLOCKED, plan, aloft, basis, 10.0)
+    assert replanner.look(aloft, 10.0) is Cause.EDITED
+
+
+def test_what_is_seen_while_a_plan_is_made_is_looked_at_when_it_is_flown():
+    observed, aloft = on_the_way(), part_way()
+    replanner = Replanner(INDOOR, observed)
+    basis = replanner.basis
+    plan = plan_mission(remaining_mission(INDOOR, aloft, observed.boxes()), seed=0)
+    pillar(observed, plan.vehicles[1].curve_m[len(plan.vehicles[1].curve_m) // 2][:2])
+    assert replanner.judge(Cause.BLOCKED, plan, aloft, basis, 10.0) == ""
+    assert replanner.look(part_way(plan, 0.0), 11.0) is Cause.BLOCKED
+
+
+def test_an_edit_that_did_not_reach_every_vehicle_is_planned_for_again():
+    observed, aloft = ObservedMap(INDOOR.world.bounds), part_way()
+    replanner = Replanner(INDOOR, observed)
+    replanner.edit(INDOOR)
+    plan = plan_mission(remaining_mission(INDOOR, aloft, ()), seed=0)
+    assert replanner.judge(Cause.EDITED, plan, aloft, replanner.basis, 10.0) == ""
+    assert replanner.look(aloft, 20.0) is None
+    replanner.forget_plan()
+    assert replanner.look(aloft, 20.0) is Cause.EDITED

@@ -1,6 +1,7 @@
 """The audit log: who ordered what, and what came of it."""
 
 import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +101,14 @@ def test_parameters_and_uploads_are_orders(desk: Desk):
         ("upload of a fence", {"items": 7}, None),
         (None, None, "ACCEPTED"),
     ]
+
+
+def test_an_integer_parameter_is_noted_as_the_integer_that_it_is(desk: Desk):
+    carried = struct.unpack("<f", struct.pack("<i", 5))[0]
+    desk.audit.sent(mavlink.MAVLink_param_set_message(1, 1, b"NAV_DLL_ACT", carried, 6), 1)
+    desk.answer(mavlink.MAVLink_param_value_message(b"NAV_DLL_ACT", carried, 6, 1, 0))
+    assert desk.entries[0]["content"] == {"name": "NAV_DLL_ACT", "value": 5}
+    assert desk.entries[1]["result"] == "value 5"
 
 
 def test_reading_is_no_order(desk: Desk):

@@ -89,6 +89,20 @@ def test_a_replay_is_refused_after_a_restart(tmp_path: Path):
     assert len(restarted.parse(frame(KEY, NOW + RESERVE + 1))) == 1
 
 
+def test_a_vehicle_is_heard_although_its_timestamps_cannot_be_kept(tmp_path: Path):
+    ring, said = KeyRing(tmp_path / "ring"), []
+    ring.save({1: VehicleKey(KEY)})
+    codec = Codec(signing=ring.signing(lambda: NOW_UNIX_US, said.append))
+    ring.folder.rename(tmp_path / "elsewhere")
+    ring.folder.touch()  # nothing can be written into it
+    for late in range(3):
+        assert len(codec.parse(frame(KEY, NOW + late * (RESERVE + 1)))) == 1
+    assert codec.parse(frame()) == []  # a replay is one as before
+    (text,) = said
+    assert "keys cannot be written: " in text
+    assert "may take old frames for new" in text
+
+
 def test_timestamps_of_another_key_do_not_bind_a_new_one(tmp_path: Path):
     ring = KeyRing(tmp_path / "ring")
     ring.save({1: VehicleKey(KEY, None, NOW, {(1, 0): NOW})})

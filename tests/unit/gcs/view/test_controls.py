@@ -29,7 +29,7 @@ class Editing:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self.server, self.drawn = server, load_mission("indoor")
-        self.panel = EditingPanel(server, self.drawn, self._show)
+        self.panel = EditingPanel(server, self.drawn, self._show, lambda draft, client: None)
 
     def _show(self, mission: Mission, on_pick: object) -> None:
         self.drawn = mission

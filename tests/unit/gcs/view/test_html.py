@@ -10,11 +10,14 @@ from gcs.dialect import Mode
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight.events import Event, Severity
 from gcs.flight.monitor import Phase
-from gcs.view import event_list, fleet_table, mission_card, words
+from gcs.link.paths import SystemPaths
+from gcs.security.signing import VehicleKey
+from gcs.view import event_list, fleet_table, link_table, mission_card, words
 from gcs.view.colours import Tone
 from gcs.view.sightings import sightings
 from missions.tunnel import CompanionState, CompanionStatus, Reason
 from tests.browser.scripted_plan import scripted_progress
+from tests.unit.gcs import messages as mav
 from tests.unit.gcs.view.desks import make_desk
 
 NASTY = "<img src=x onerror=alert(1)> & \"quoted\" 'too'"
@@ -107,8 +110,27 @@ async def test_a_row_tells_mode_phase_numbers_and_companion():
     assert row.to_target_m == pytest.approx(math.dist((1.0, 6.5, 0.0), (19.0, 8.5, 1.5)), abs=1e-2)
     assert row.companion == ("flying", Tone.GOOD)
     text = Outline(fleet_table.render([row])).text
-    assert "alpha Offboard flying 71 % 0.0 m 5.0 m/s – 18.2 m 0 % 0:06 flying 1.4 ms live –" in text
+    assert "alpha Offboard flying 71 % 0.0 m 5.0 m/s – 18.2 m 0 % 0:06 flying 1.4 ms live – no" in text
     assert 'tr class="selected"' in fleet_table.render([row])
+
+
+async def test_a_vehicle_that_is_not_ready_says_why_in_its_autopilots_words():
+    desk = await make_desk()
+    desk.vehicles[1].fold(mav.system_status(ready=False), desk.station.now_s)
+    desk.vehicles[1].fold(mav.status_text("Preflight Fail: ekf2 missing data", severity=3), desk.station.now_s)
+    unready, ready = await table_of(desk)
+    assert (unready.phase, unready.reason) == (("not ready", Tone.WARN), "Preflight Fail: ekf2 missing data")
+    assert ready.phase[0] == "waiting"
+    desk.vehicles[1].fold(mav.system_status(ready=True), desk.station.now_s)
+    assert (await table_of(desk))[0].phase[0] == "waiting"
+
+
+async def test_a_row_tells_whether_its_vehicle_signs():
+    desk = await make_desk()
+    assert [row.trust for row in await table_of(desk)] == [("no", Tone.WARN)] * 2
+    desk.station.codec.signing.vehicles[1] = VehicleKey(next_key=bytes(32))
+    alpha, bravo = await table_of(desk)
+    assert (alpha.trust, bravo.trust) == (("key pending", Tone.WARN), ("no", Tone.WARN))
 
 
 def test_a_large_fleet_stands_closer():
@@ -167,6 +189,19 @@ def test_a_live_link_stands_still_and_an_old_one_warns():
     assert words.age_words(2.0) == ("2 s", Tone.WARN)
     assert words.age_words(12.0) == ("12 s", Tone.BAD)
     assert words.age_words(math.inf) == (words.NOTHING, Tone.QUIET)
+
+
+async def test_the_table_of_links_tells_how_a_vehicle_is_reached():
+    desk = await make_desk(heard=(1,))
+    text = Outline(link_table.render(desk, desk.station.now_s)).text
+    assert text == f"{' '.join(link_table.HEADINGS)} alpha live – – – unsigned 0 0 0 bravo – – – – – – – –"
+    paths: SystemPaths = desk.station.routes._systems.setdefault(1, SystemPaths())
+    path = paths.path(("a link", ("127.0.0.1", 1)))
+    path.hear(1, desk.station.now_s)
+    path.round_trip_s = 0.0843
+    paths.choose(desk.station.now_s)
+    text = Outline(link_table.render(desk, desk.station.now_s)).text
+    assert "alpha live – 84 ms 1 unsigned" in text
 
 
 # ---------------------------------------------------------------- mission

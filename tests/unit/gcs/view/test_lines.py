@@ -15,6 +15,7 @@ from gcs.view.lines import (
     FleetTrails,
     SealedLine,
     SealedLines,
+    joined_where,
     thinned,
     ways_ahead,
 )
@@ -95,12 +96,27 @@ def test_every_vehicle_has_its_own_part_of_the_fleets_lines():
 
 def test_a_straight_line_is_thinned_to_its_ends_and_a_bend_is_kept():
     straight = np.column_stack((np.arange(11.0), np.zeros(11), np.zeros(11)))
-    assert len(thinned(straight, 0.01)) <= 4
     angles = np.linspace(0.0, np.pi, 11)
     bend = 5.0 * np.stack((np.cos(angles), np.sin(angles), np.zeros(11)), axis=1)
-    np.testing.assert_array_equal(thinned(bend, 0.01), bend)
-    for points in (straight, bend):
-        np.testing.assert_array_equal(thinned(points, 10.0)[[0, -1]], points[[0, -1]])
+    both = np.array([straight, bend])
+    needed = thinned(both, 0.01)
+    assert needed[0].sum() <= 4
+    assert needed[1].all()
+    assert thinned(both, 10.0)[:, [0, -1]].all()
+    segments, of_line = joined_where(both, needed)
+    np.testing.assert_array_equal(segments[of_line == 1], polyline(bend))
+    np.testing.assert_array_equal(segments[of_line == 0][[0, -1], [0, 1]], straight[[0, -1]])
+
+
+def test_a_corner_between_straight_ways_stays_where_it_is():
+    for corner in range(1, 10):
+        way = np.zeros((1, 11, 3))
+        way[0, :, 0], way[0, :, 1] = np.minimum(np.arange(11), corner), np.maximum(np.arange(11) - corner, 0)
+        segments, _ = joined_where(way, thinned(way, 0.05))
+        along = np.linspace(0.0, 1.0, 201)[:, None, None]
+        drawn = (segments[:, 0] + along * (segments[:, 1] - segments[:, 0])).reshape(-1, 3)
+        for point in way[0]:
+            assert np.linalg.norm(drawn - point, axis=1).min() < 0.1
 
 
 def seal(sealed: SealedLines, count: int) -> dict[str, SealedLine]:
@@ -108,7 +124,7 @@ def seal(sealed: SealedLines, count: int) -> dict[str, SealedLine]:
     standing: dict[str, SealedLine] = {}
     for number in range(count):
         points_m = np.column_stack((10.0 * number + np.arange(11.0), np.zeros(11), np.zeros(11)))
-        new, gone = sealed.add(polyline(points_m), (number % 256, 0, 0))
+        new, gone = sealed.add(polyline(points_m), np.full((10, 3), (number % 256, 0, 0), np.uint8))
         for line in gone:
             del standing[line.name]
         standing |= {line.name: line for line in new}

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import viser
 
+from gcs.desk import Desk
 from gcs.dialect import Mode
-from gcs.flight.events import Severity
+from gcs.flight.events import EventLog, Severity
 from gcs.flight.trails import Trails
+from gcs.station import Station
 from gcs.view import page as page_module
 from gcs.view.lines import AHEAD, CHUNK
 from gcs.view.page import Page
@@ -163,6 +165,13 @@ async def test_without_a_mission_vehicles_are_drawn_once_there_is_a_frame(
     assert len(node(browser, "/fleet/hull").batched_positions) == 2
 
 
+async def test_a_page_waits_for_the_first_vehicle(server: viser.ViserServer):
+    desk = Desk(Station(), EventLog(lambda: 0.0))
+    for now_s in (0.0, 1.0, 2.0):
+        desk.observations.histories.record(now_s, {})
+    Page(server, desk).update(3.0)
+
+
 async def test_a_moved_origin_begins_the_trails_anew(server: viser.ViserServer, indoor: ScriptedDesk):
     shown = Shown(server, indoor)
     shown.fly(3.0)
@@ -172,16 +181,19 @@ async def test_a_moved_origin_begins_the_trails_anew(server: viser.ViserServer, 
     assert not node(server, "/trails/newest").visible
 
 
-async def test_a_long_flight_does_not_swell_what_a_browser_has_to_be_sent(server: viser.ViserServer):
+async def test_a_long_flight_does_not_swell_what_a_browser_has_to_be_sent(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+):
     scripted = ScriptedDesk("indoor")
-    await scripted.begin(at_s=[2.0, 2.0])
     shown = Shown(server, scripted)
-    shown.fly(1.0)
+    monkeypatch.setattr(Station, "now_s", property(lambda _: shown.now_s))
+    await scripted.begin(at_s=[2.0, 2.0])
+    shown.fly(5.0)  # the plots come with their second observation
     buffered = len(server._websock_server._broadcast_buffer.message_from_id)
     for vehicle in scripted.vehicles:
         vehicle.mode = Mode.HOLD
-    shown.fly(20.0)
-    assert len(server._websock_server._broadcast_buffer.message_from_id) <= buffered + 20  # the plots come meanwhile
+    shown.fly(60.0)
+    assert len(server._websock_server._broadcast_buffer.message_from_id) <= buffered + 5
 
 
 async def test_what_autopilots_say_is_taken_into_the_log_once(server: viser.ViserServer, indoor: ScriptedDesk):

@@ -1,0 +1,85 @@
+"""Commands, targets and files that the documentation names exist, and the tutorial's mission can be flown."""
+
+import importlib
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import typer
+
+from gcs.planner import plan_mission
+from missions.mission import load_mission
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted(path for path in (ROOT / "docs").rglob("*.md") if "decisions" not in path.parts)]
+PROGRAMS = ("gcs", "companion", "sitl")
+
+
+CALL = re.compile(rf"(?:\S*bin/)?(?:{'|'.join(PROGRAMS)}) [\w-][^`|]*")
+
+
+def calls(pattern: str) -> list[tuple[str, str]]:
+    """Page and call, wherever what a pattern finds runs one of our programs."""
+    found = set()
+    for page in PAGES:
+        for code in re.findall(pattern, page.read_text(), re.M):
+            line = re.split(r"  +|\s#", code)[0].strip()
+            if CALL.fullmatch(line) and not line.endswith("DIR"):
+                found.add((page.name, line))
+    return sorted(found)
+
+
+LINES = calls(r"^(?: {4})?(\S.*)$")
+MENTIONS = calls(r"`([^`\n]+)`")
+
+
+def find_command(line: str):
+    """What a call runs, and its arguments; raises if there is no such command."""
+    program, *arguments = shlex.split(line)
+    command = typer.main.get_command(importlib.import_module(f"{Path(program).name}.cli").app)
+    while hasattr(command, "resolve_command"):
+        group = command.make_context(command.name, [], resilient_parsing=True)
+        _, command, arguments = command.resolve_command(group, arguments)
+    return command, arguments
+
+
+def test_the_documentation_has_calls_to_try():
+    assert (len(LINES) > 20, len(MENTIONS) > 20) == (True, True)
+
+
+@pytest.mark.parametrize(("page", "line"), LINES)
+def test_every_call_in_a_block_of_code_is_understood(page: str, line: str):
+    command, arguments = find_command(line)
+    command.make_context(command.name, arguments)
+
+
+@pytest.mark.parametrize(("page", "line"), MENTIONS)
+def test_every_call_in_the_text_has_its_options(page: str, line: str):
+    command, arguments = find_command(line)
+    known = {name for parameter in command.params for name in parameter.opts} | {"--help"}
+    assert {word for word in arguments if word.startswith("--")} <= known
+
+
+def test_every_target_of_make_that_is_named_exists():
+    targets = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.M))
+    for page in PAGES:
+        named = set(re.findall(r"(?:^ {4}|`)make ([a-z0-9-]+)(?!_)\b", page.read_text(), re.M))
+        assert named <= targets, page.name
+
+
+def test_every_file_that_is_named_exists():
+    for page in PAGES:
+        for name in re.findall(
+            r"`((?:gcs|companion|sitl|missions|tests|docs)/[\w/.-]+\.(?:py|md|yaml))`", page.read_text()
+        ):
+            assert (ROOT / name).exists(), f"{page.name}: {name}"
+
+
+def test_the_mission_of_the_tutorial_is_planned(tmp_path: Path):
+    (source,) = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/tutorials/write-a-mission.md").read_text(), re.S)
+    path = tmp_path / "warehouse.yaml"
+    path.write_text(source)
+    mission = load_mission(path)
+    assert [box.name for box in mission.world.boxes if not box.known] == ["pallet"]
+    assert plan_mission(mission).feasible
