@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes fuzz bench-view screenshots check docs dist check-dist format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes soak fuzz bench-view screenshots check docs dist check-dist format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -61,8 +61,8 @@ check-px4: install  ## fly the whole sequence on an autopilot that is there: mak
 bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, about an hour: make bench-planner SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.planner --seeds $(SEEDS) $(BENCH)
 
-experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10
-	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS)
+experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10 [OUTPUT=docs/results]
+	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS) $(if $(OUTPUT),--output $(OUTPUT))
 
 bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, alone (50 seeds are asked for) and in fleets: make bench-onboard SEEDS=0:10 [BENCH=--quick]
 	@alone=0; $(BIN)/python -m tests.benchmarks.onboard --seeds $(SEEDS) $(BENCH) || alone=1; \
@@ -70,6 +70,10 @@ bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, alone (50 seeds a
 
 bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK and MAVProxy, and a fleet of a hundred: make bench-link SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.link --seeds $(SEEDS) $(BENCH)
+
+SEED0 ?= 0
+soak: $(VENV)/.installed-dev  ## whole flights with everything going wrong, in process: make soak SEEDS=100 [SEED0=M]
+	$(BIN)/python -m tests.soak --seeds $(SEEDS) --seed0 $(SEED0)
 
 SECONDS ?= 60
 fuzz: $(VENV)/.installed-dev  ## hostile traffic on all receive paths: make fuzz SECONDS=60

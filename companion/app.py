@@ -81,7 +81,7 @@ class App:
         self._ended = asyncio.Event()
         self._state = self.pilot.state
         self._actions: set[asyncio.Task[None]] = set()
-        self._observations = Observations(self.planner.voxel_m, self.settings.report_bytes_s)
+        self.observations = Observations(self.planner.voxel_m, self.settings.report_bytes_s)
         self._noted_s = -math.inf
         self._unseen: Scan | None = None
         self._observing = False
@@ -167,7 +167,7 @@ class App:
             self._unseen = None
             others = self.fleet.exchange.neighbours(self._now_s) if self.fleet is not None else ()
             await self.work(partial(self._take_in, scan, others))
-            for block in self._observations.due(scan.sensor_enu_m, scan.time_s):
+            for block in self.observations.due(scan.sensor_enu_m, scan.time_s):
                 self.autopilot.send_tunnel(PayloadType.OCCUPANCY, block)
         self._observing = False
 
@@ -176,7 +176,7 @@ class App:
         self.planner.observe(scan, others)
         if scan.time_s - self._noted_s >= self.settings.pilot.report_interval_s:
             self._noted_s = scan.time_s
-            self._observations.update(*self.planner.certain(), scan.time_s)
+            self.observations.update(*self.planner.certain(), scan.time_s)
 
     async def _wait_for_stop(self) -> None:
         await self._stop.wait()

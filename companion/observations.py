@@ -21,6 +21,7 @@ from missions.occupancy import (
 
 Array = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
 
 COARSENING = 2
 """A reported voxel is so many times as large as one of the map: the cloud plans with metres, the link has few bytes."""
@@ -55,6 +56,12 @@ class Observations:
         self.budget_bytes_s = budget_bytes_s
         self._blocks: dict[BlockIndex, _Block] = {}
         self._saved_bytes, self._saved_at_s = 0.0, -np.inf
+
+    @property
+    def voxels(self) -> IntArray:
+        """(n, 3) indices of the voxels that are reported as occupied."""
+        blocks = [np.argwhere(b.occupied) + BLOCK_VOXELS * np.array(index) for index, b in self._blocks.items()]
+        return np.concatenate(blocks) if blocks else np.empty((0, 3), np.int64)
 
     def update(self, occupied_enu_m: Array, low_m: Array, high_m: Array, now_s: float) -> None:
         """Take in a window of the map; what lies outside of it stays as it was.

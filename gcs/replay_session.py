@@ -5,18 +5,15 @@ from dataclasses import dataclass, field
 
 from gcs.app import Page
 from gcs.desk import Desk
-from gcs.errors import FlightAborted
 from gcs.flight.events import EventLog
 from gcs.flight.journal import Story
-from gcs.flight.sequence import FleetFlight
+from gcs.flight.rejoining import told_flight
 from gcs.flight.told import Told
 from gcs.flight.trails import Trail, Trails
-from gcs.planner.plan import FleetPlan
 from gcs.replay.player import Player
 from gcs.replay.ways import Way, Ways
 from gcs.station import Station
 from missions.frames import LocalFrame
-from missions.mission import Mission
 
 STEP_S = 0.05
 
@@ -51,7 +48,7 @@ class ReplaySession:
         self._ways = Ways(self.player.recording)
         station = ReplayStation(fleet=self.player.fleet, player=self.player)
         events = EventLog(lambda: self.player.position_s)
-        self.flight = _flight(self.story, station, events) if self.story is not None else None
+        self.flight = told_flight(self.story, station, events) if self.story is not None else None
         self.desk = Desk(station, events, self.flight, player=self.player)
         self.player.on_seek.append(self._renew)
         self._renew()
@@ -100,17 +97,6 @@ class ReplaySession:
     def _offsets_m(self) -> dict[int, float]:
         parts = self.flight.vehicles if self.flight is not None else {}
         return {sysid: part.monitor.ground_offset_m for sysid, part in parts.items()}
-
-
-def _flight(story: Story, station: Station, events: EventLog) -> FleetFlight:
-    """The flight of a recording, for its mission, its plan and its ground offsets; nobody flies it."""
-    flight = FleetFlight(station, story.mission, story.began.mode, _no_planner, events, story.began.speed)
-    story.restore(flight)
-    return flight
-
-
-async def _no_planner(mission: Mission) -> FleetPlan:
-    raise FlightAborted(f"{mission.name} is a recording")
 
 
 def _trail(way: Way, frame: LocalFrame, count: int, ground_offset_m: float) -> Trail:

@@ -72,6 +72,8 @@ class VehicleState:
     failsafe: bool = False
     landed: LandedState = LandedState.UNDEFINED
     ready_to_arm: bool = False
+    status_s: float = -math.inf
+    """Last SYS_STATUS: before it, nobody knows whether it is ready."""
     place: GeodeticPoint | None = None
     place_s: float = -math.inf
     velocity_enu_m_s: Array = field(default_factory=lambda: np.zeros(3))
@@ -157,8 +159,9 @@ class VehicleState:
         self.landed = LandedState(message.landed_state)
 
     def _sys_status(self, message: Message, now_s: float) -> None:
+        self.status_s = now_s
         self.ready_to_arm = bool(message.onboard_control_sensors_health & PREARM_BIT)
-        if message.battery_remaining >= 0:
+        if 0 <= message.battery_remaining <= 100:
             self.battery_percent = float(message.battery_remaining)
 
     def _global_position(self, message: Message, now_s: float) -> None:

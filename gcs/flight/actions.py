@@ -15,6 +15,11 @@ def arm() -> Command:
     return Command("arm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,))
 
 
+def check_readiness() -> Command:
+    """Have the autopilot say once more what keeps it from arming: we may not have heard it when it changed."""
+    return Command("check readiness", mavlink.MAV_CMD_RUN_PREARM_CHECKS)
+
+
 def disarm() -> Command:
     """Refused by the autopilot while it flies."""
     return Command("disarm", mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (0.0,))

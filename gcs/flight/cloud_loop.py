@@ -36,10 +36,25 @@ LOOK_INTERVAL_S = 0.05
 """In vehicle time, as all that follows."""
 SWAP_TIMEOUT_S = 5.0
 """A companion that has the new mission for so long and does not fly it is said so."""
+HAND_OVER_TIMEOUT_S = 15.0
+"""A mission that could not be stored within this time was made for places that the vehicles have long left."""
 ARRIVING_M = 1.5
 """Who is so near to its last target, or within its arrival tolerance where that is more, is not sent elsewhere."""
 SAME_WAY_SHARE = 0.25
 """A vehicle whose new curve stays within this share of the clearance of its old one keeps what it has."""
+
+
+@dataclass(frozen=True)
+class NewPlan:
+    """One vehicle's part of a new plan, as it is sent.
+
+    Args:
+        part: of the plan.
+        items: the mission that it becomes.
+    """
+
+    part: VehiclePlan
+    items: tuple[MissionItem, ...]
 
 
 @dataclass
@@ -60,6 +75,7 @@ class CloudLoop:
         observed = self.flight.station.fleet.observed
         observed.bounds = self.flight.mission.world.bounds
         self.replanner = Replanner(self.flight.mission, observed)
+        self._unconfirmed: dict[int, dict[int, NewPlan]] = {}
 
     def edit(self, mission: Mission) -> None:
         """Fly a changed mission: other obstacles, targets, or fewer vehicles."""
@@ -71,12 +87,14 @@ class CloudLoop:
         if self.flight.mode is not PlanningMode.END_CLOUD:
             return
         self.replanner.mission = self.flight.mission  # its origin may have moved since
+        self._unconfirmed.clear()
         for vehicle in self.flight.vehicles.values():
             vehicle.passed_samples = 0  # it may have flown this plan before
         while True:
+            self._reconcile()
             aloft = list(self._aloft())
             cause = self.replanner.look(aloft, self._now_s)
-            if cause is not None:
+            if cause is not None and self._can_be_told(aloft):
                 with acting_as(Origin.REPLANNER):
                     await self._replan(cause, aloft)
             await asyncio.sleep(LOOK_INTERVAL_S / self.flight.speed)
@@ -124,20 +142,43 @@ class CloudLoop:
         """Give one vehicle its new mission; False where it may still fly the old one."""
         flight, vehicle = self.flight, self.flight.vehicles[part.sysid]
         items = mission_items(part, flight.mission, flight.mode, vehicle.monitor.ground_offset_m)
+        new = NewPlan(part, items)
         try:
             await self._hand_over(vehicle, items)
         except GcsError as problem:
             flight.events.add("swap failed", str(problem), vehicle.name, Severity.WARNING)
+            self._unconfirmed.setdefault(part.sysid, {})[plan_id(items)] = new
             return False
-        vehicle.change_plan(part)
-        vehicle.take_items(items, flight.mission)
-        assert flight.plan is not None
-        parts = tuple(part if old.sysid == part.sysid else old for old in flight.plan.vehicles)
-        flight.plan = replace(flight.plan, vehicles=parts)
+        self._take(vehicle, new)
         took_s = self._now_s - began_s
         self.swaps_s.append(took_s)
         flight.events.add("swapped", f"flies the new plan after {took_s:.2f} s", vehicle.name, plan_id=plan_id(items))
         return True
+
+    def _take(self, vehicle: VehicleFlight, new: NewPlan) -> None:
+        """This is what a vehicle flies from now on."""
+        flight = self.flight
+        vehicle.change_plan(new.part)
+        vehicle.take_items(new.items, flight.mission)
+        assert flight.plan is not None
+        parts = tuple(new.part if old.sysid == vehicle.sysid else old for old in flight.plan.vehicles)
+        flight.plan = replace(flight.plan, vehicles=parts)
+        self._unconfirmed.pop(vehicle.sysid, None)
+
+    def _reconcile(self) -> None:
+        """Companions that fly a plan whose arrival they could not confirm in time: it is theirs, and not sent again."""
+        for sysid, plans in tuple(self._unconfirmed.items()):
+            status = self.flight.state(sysid).companion.status
+            if status is not None and status.plan_id in plans:
+                vehicle = self.flight.vehicles[sysid]
+                self._take(vehicle, plans[status.plan_id])
+                text = "flies a plan that it could not confirm in time"
+                self.flight.events.add("reconciled", text, vehicle.name, plan_id=status.plan_id)
+
+    def _can_be_told(self, aloft: Sequence[Aloft]) -> bool:
+        """Everybody is heard: the cloud plans for all together, so it waits while one of them is out of reach."""
+        now_s = self.flight.station.now_s
+        return all(self.flight.state(vehicle.sysid).companion_online(now_s) for vehicle in aloft)
 
     async def _hand_over(self, vehicle: VehicleFlight, items: tuple[MissionItem, ...]) -> None:
         """Store a mission on a vehicle; over when its companion flies it.
@@ -148,7 +189,10 @@ class CloudLoop:
         storing = asyncio.ensure_future(upload.swap(self.flight.station, vehicle.sysid, items))
         flying = asyncio.ensure_future(self._flies(vehicle, plan_id(items)))
         try:
-            await asyncio.wait((storing, flying), return_when=asyncio.FIRST_COMPLETED)
+            longest_s = HAND_OVER_TIMEOUT_S / self.flight.speed
+            await asyncio.wait((storing, flying), timeout=longest_s, return_when=asyncio.FIRST_COMPLETED)
+            if not (storing.done() or flying.done()):
+                raise LinkLost(f"vehicle {vehicle.sysid} has not got the new plan in time")
             if not flying.done():
                 storing.result()
                 await asyncio.wait((flying,), timeout=SWAP_TIMEOUT_S / self.flight.speed)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gcs.dialect import mavlink
 from gcs.fleet.vehicle_state import VehicleState
 from missions.frames import GeodeticPoint
 from missions.mission import Mission, Vehicle
@@ -23,8 +24,13 @@ def problems(state: VehicleState, vehicle: Vehicle, mission: Mission, now_s: flo
     if state.armed:
         yield "already armed"
     if not state.ready_to_arm:
-        said = [text.text for text in state.texts if text.severity <= 4][-3:]
-        yield "not ready to arm" + (f"; it said: {'; '.join(said)}" if said else "")
+        said = "; ".join(autopilots_reasons(state))
+        yield "not ready to arm" + (f"; it said: {said}" if said else "")
+
+
+def autopilots_reasons(state: VehicleState) -> list[str]:
+    """The last warnings of an autopilot that is not ready to arm, in its own words."""
+    return [text.text for text in state.texts if text.severity <= mavlink.MAV_SEVERITY_WARNING][-3:]
 
 
 def ground_offset_m(state: VehicleState, vehicle: Vehicle, mission: Mission) -> float:

@@ -1,12 +1,13 @@
 """What is done on the ground before a vehicle may be armed: hear it, check it, set it up, store fence and mission."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 import numpy.typing as npt
 
 from gcs.dialect import AUTOPILOT, mavlink
-from gcs.errors import CommandRefused, PreflightError
+from gcs.errors import CommandRefused, LinkLost, PreflightError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import actions, preflight, safety_parameters, upload
 from gcs.flight.fence import fence_items
@@ -28,7 +29,8 @@ Array = npt.NDArray[np.float64]
 CONNECT_TIMEOUT_S = 240.0
 """Wall clock; on a fresh machine the companions first compile their planner."""
 
-READY_TIMEOUT_S = 60.0
+SETTLING_S, READY_TIMEOUT_S = 3.0, 60.0
+"""A vehicle that is not ready after the first of them is asked why, and given until the second."""
 COMPANION_READY_TIMEOUT_S = 30.0
 
 FRAME_BYTES = 12
@@ -120,6 +122,11 @@ class Preparation(Operation):
         def problems() -> list[str]:
             return list(preflight.problems(self._state(flight), flight.vehicle, self.mission, self.station.now_s))
 
+        if await self.station.holds_within(lambda: not problems(), SETTLING_S):
+            return
+        if not self._state(flight).ready_to_arm:
+            with suppress(CommandRefused, LinkLost):  # then it has said all that it will
+                await self.station.run(CommandClient(actions.check_readiness(), (flight.sysid, AUTOPILOT)))
         if not await self.station.holds_within(lambda: not problems(), READY_TIMEOUT_S):
             raise PreflightError(f"{flight.name} (vehicle {flight.sysid}): {'; '.join(problems())}")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 
 from gcs.dialect import AUTOPILOT
-from gcs.errors import GcsError
+from gcs.errors import FlightAborted, GcsError
 from gcs.fleet.vehicle_state import LandedState, VehicleState
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.journal import JOURNAL_FILE, Story, is_written, read_story
@@ -14,6 +14,7 @@ from gcs.flight.sequence import FleetFlight
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.mission_comparison import first_difference
 from gcs.microservices.mission_download import MissionDownload
+from gcs.planner.plan import FleetPlan
 from gcs.station import Station
 from missions.mission import Mission
 
@@ -33,12 +34,35 @@ def unfinished(folder: Path, mission: Mission) -> Story | None:
 
 def left_in_flight(folders: Path, mission: Mission) -> Path | None:
     """The newest of many flights' folders that holds an unfinished flight of a mission, its ground station gone."""
-    if not folders.is_dir():
-        return None
-    for folder in sorted(folders.iterdir(), reverse=True)[:LOOKED_AT]:
+    for folder in _newest(folders):
         if unfinished(folder, mission) is not None and not is_written(folder / JOURNAL_FILE):
             return folder
     return None
+
+
+def newest_left_in_flight(folders: Path) -> Path | None:
+    """The same of whatever mission, for whoever has none to compare."""
+    for folder in _newest(folders):
+        story = read_story(folder / JOURNAL_FILE)
+        if story is not None and not story.ended and story.aloft and not is_written(folder / JOURNAL_FILE):
+            return folder
+    return None
+
+
+def _newest(folders: Path) -> list[Path]:
+    return sorted(folders.iterdir(), reverse=True)[:LOOKED_AT] if folders.is_dir() else []
+
+
+def told_flight(story: Story, station: Station, events: EventLog) -> FleetFlight:
+    """A flight as a journal tells it: its mission, its plan, and how far each vehicle was; nobody plans it anew."""
+    flight = FleetFlight(station, story.mission, story.began.mode, _no_planner, events, story.began.speed)
+    flight.passive, flight.unattended = True, False
+    story.restore(flight)
+    return flight
+
+
+async def _no_planner(mission: Mission) -> FleetPlan:
+    raise FlightAborted(f"{mission.name} is only looked at")
 
 
 async def rejoin(flight: FleetFlight, events: EventLog) -> None:

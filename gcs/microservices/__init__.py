@@ -45,7 +45,7 @@ class Microservice(ABC):
 class Backoff:
     """When to ask again: after `first_s`, then each time half as long again, at most `attempts` times."""
 
-    def __init__(self, first_s: float, attempts: int, longest_s: float = 3.0) -> None:
+    def __init__(self, first_s: float, attempts: int, longest_s: float = 2.0) -> None:
         self._next_s, self._longest_s, self._attempts = first_s, longest_s, attempts
         self.taken = 0
         """Attempts used."""

@@ -13,7 +13,7 @@ from missions.frames import GeodeticPoint
 from missions.mission_items import DEG_E7
 
 FIRST_TIMEOUT_S = 0.5
-ATTEMPTS = 10
+ATTEMPTS = 16
 PROGRESS_TIMEOUT_S = 30.0
 """Patience once the other side has said that it is at work."""
 

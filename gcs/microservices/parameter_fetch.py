@@ -62,7 +62,7 @@ class ParameterFetch(Microservice):
     _found: dict[int, tuple[str, Parameter]] = field(default_factory=dict)
     _count: int | None = None
     _hash: int | None = None
-    _rounds: Backoff = field(default_factory=lambda: Backoff(QUIET_S, ROUNDS, 2.0))
+    _rounds: Backoff = field(default_factory=lambda: Backoff(QUIET_S, ROUNDS))
 
     def start(self, now_s: float) -> list[Message]:
         """With a kept copy the hash alone is asked for first."""

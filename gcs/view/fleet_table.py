@@ -9,7 +9,9 @@ from html import escape
 import numpy as np
 
 from gcs.desk import Desk
-from gcs.flight.monitor import VehicleMonitor
+from gcs.fleet.vehicle_state import VehicleState
+from gcs.flight.monitor import Phase, VehicleMonitor
+from gcs.flight.preflight import autopilots_reasons
 from gcs.view import words
 from gcs.view.colours import Rgb, Tone, css
 from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
@@ -93,8 +95,8 @@ def _row(
         colour,
         sysid in selected,
         mode=words.mode_words(state, now_s),
-        phase=words.phase_words(monitor.phase if monitor else None, monitor is not None and monitor.reached),
-        reason=monitor.reason if monitor else "",
+        phase=_phase(state, monitor),
+        reason=_reason(state, monitor),
         battery_percent=state.battery_percent,
         height_m=float(sighting.position_m[2]) if sighting else math.nan,
         speed_m_s=float(np.linalg.norm(state.velocity_enu_m_s)) if sighting else math.nan,
@@ -108,6 +110,24 @@ def _row(
         quality=outlook.link_quality if outlook is not None else math.nan,
         trust=words.trust_words(desk.station.codec.signing.trust(sysid)),
     )
+
+
+def _is_unready(state: VehicleState, monitor: VehicleMonitor | None) -> bool:
+    """On the ground, and its autopilot would refuse to arm."""
+    waits = monitor is None or monitor.phase is Phase.WAITING
+    return waits and not state.armed and not state.ready_to_arm and math.isfinite(state.status_s)
+
+
+def _phase(state: VehicleState, monitor: VehicleMonitor | None) -> tuple[str, Tone]:
+    if _is_unready(state, monitor):
+        return "not ready", Tone.WARN
+    return words.phase_words(monitor.phase if monitor else None, monitor is not None and monitor.reached)
+
+
+def _reason(state: VehicleState, monitor: VehicleMonitor | None) -> str:
+    """Why it is in its phase; of one that is not ready, in the autopilot's own words."""
+    said = "; ".join(autopilots_reasons(state)) if _is_unready(state, monitor) else ""
+    return said or (monitor.reason if monitor else "")
 
 
 def _distance_m(sighting: Sighting | None, monitor: VehicleMonitor | None) -> float:

@@ -1,5 +1,6 @@
 """Fence, preflight checks, read-back comparison, safety parameters and the report's arithmetic."""
 
+import asyncio
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,18 +9,24 @@ import numpy as np
 import pytest
 
 from gcs.dialect import mavlink
+from gcs.errors import PreflightError
 from gcs.fleet.vehicle_state import VehicleState
 from gcs.flight import preflight
 from gcs.flight.events import KEPT_AFTER, MOST_KEPT, EventLog, Severity
 from gcs.flight.fence import fence_height_m, fence_items
 from gcs.flight.monitor import VehicleMonitor
+from gcs.flight.preparation import Preparation
 from gcs.flight.report import TRUTH_HEADER, Flown, min_separation_m, read_truth
 from gcs.flight.safety_parameters import requirements
 from gcs.flight.vehicle_flight import VehicleFlight
+from gcs.link.codec import Codec
 from gcs.microservices.mission_comparison import first_difference
 from gcs.planner import plan_mission
+from gcs.settings import PlanningMode
+from gcs.station import Station
 from missions.mission import load_mission
 from missions.mission_items import Track, encode_track
+from tests.simulation import virtual_time
 from tests.unit.gcs import messages as mav
 
 INDOOR = load_mission("indoor")
@@ -57,6 +64,51 @@ def test_what_keeps_a_vehicle_from_arming_is_named_in_the_autopilots_words():
     state.fold(mav.heartbeat(armed=True), 10.0)
     found = list(preflight.problems(state, ALPHA, INDOOR, 10.1))
     assert found == ["already armed", "not ready to arm; it said: Preflight Fail: ekf2 missing data"]
+
+
+class Unready:
+    """A connection with a vehicle behind it that stands on its pad, and says why it does not arm when it is asked."""
+
+    peer = None
+    budget_bytes_s: float | None = None
+
+    def __init__(self) -> None:
+        self.station, self.asked = Station(), 0
+
+    async def speak(self) -> None:
+        place = on_its_pad().place
+        assert place is not None
+        position = mav.position(place.latitude_deg, place.longitude_deg, place.altitude_amsl_m)
+        while True:
+            for message in (mav.heartbeat(), position, mav.system_status(ready=False)):
+                self.hear(message)
+            await asyncio.sleep(0.5)
+
+    def hear(self, message) -> None:
+        self.station.receive(self, bytes(message.get_msgbuf()), ("127.0.0.1", 1))
+
+    def send(self, datagram: bytes, address: tuple[str, int]) -> None:
+        (order,) = Codec().parse(datagram)
+        assert (order.get_type(), order.command) == ("COMMAND_LONG", mavlink.MAV_CMD_RUN_PREARM_CHECKS)
+        self.asked += 1
+        loop = asyncio.get_running_loop()
+        loop.call_soon(self.hear, mav.command_ack(order.command, mavlink.MAV_RESULT_ACCEPTED))
+        loop.call_soon(self.hear, mav.status_text("Preflight Fail: horizontal position unstable", severity=3))
+
+
+def test_a_vehicle_that_does_not_become_ready_is_asked_why_and_nothing_is_armed():
+    async def play() -> int:
+        vehicle = Unready()
+        speaking = asyncio.create_task(vehicle.speak())
+        await asyncio.sleep(0.1)
+        preparation = Preparation(vehicle.station, INDOOR, PlanningMode.CLOUD, EventLog(lambda: 0.0), 1.0)
+        monitor = VehicleMonitor(INDOOR.targets[0], INDOOR.on_arrival, 0.5, 300.0, True, True, INDOOR.frame, 0.0)
+        with pytest.raises(PreflightError, match="it said: Preflight Fail: horizontal position unstable"):
+            await preparation.prepare(VehicleFlight(ALPHA, monitor), [])
+        speaking.cancel()
+        return vehicle.asked
+
+    assert virtual_time.run(play()) == 1
 
 
 def test_old_news_is_no_position():

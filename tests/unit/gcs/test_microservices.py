@@ -8,6 +8,7 @@ import pytest
 from gcs.dialect import mavlink
 from gcs.errors import CommandRefused, LinkLost, ParameterError
 from gcs.flight import actions
+from gcs.microservices import parameter_client
 from gcs.microservices.command_client import ATTEMPTS, PROGRESS_TIMEOUT_S, CommandClient
 from gcs.microservices.parameter_client import ParameterExchange
 from missions.frames import GeodeticPoint
@@ -116,6 +117,16 @@ def test_setting_reads_the_type_first_then_sets_and_waits_for_the_echo():
     assert struct.pack("<f", setting.param_value) == struct.pack("<i", 5)
     assert not exchange.done
     exchange.receive(integer("COM_OBL_RC_ACT", 5), 0.2)
+    assert exchange.done
+
+
+def test_a_type_that_came_late_leaves_setting_its_whole_patience():
+    exchange = ParameterExchange(PEER, "NAV_DLL_ACT", new_value=0)
+    exchange.start(0.0)
+    time_out(exchange, parameter_client.ATTEMPTS - 1)
+    exchange.receive(integer("NAV_DLL_ACT", 2), 30.0)
+    time_out(exchange, parameter_client.ATTEMPTS - 1)
+    exchange.receive(integer("NAV_DLL_ACT", 0), 60.0)
     assert exchange.done
 
 

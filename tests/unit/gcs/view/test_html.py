@@ -17,6 +17,7 @@ from gcs.view.colours import Tone
 from gcs.view.sightings import sightings
 from missions.tunnel import CompanionState, CompanionStatus, Reason
 from tests.browser.scripted_plan import scripted_progress
+from tests.unit.gcs import messages as mav
 from tests.unit.gcs.view.desks import make_desk
 
 NASTY = "<img src=x onerror=alert(1)> & \"quoted\" 'too'"
@@ -111,6 +112,17 @@ async def test_a_row_tells_mode_phase_numbers_and_companion():
     text = Outline(fleet_table.render([row])).text
     assert "alpha Offboard flying 71 % 0.0 m 5.0 m/s – 18.2 m 0 % 0:06 flying 1.4 ms live – no" in text
     assert 'tr class="selected"' in fleet_table.render([row])
+
+
+async def test_a_vehicle_that_is_not_ready_says_why_in_its_autopilots_words():
+    desk = await make_desk()
+    desk.vehicles[1].fold(mav.system_status(ready=False), desk.station.now_s)
+    desk.vehicles[1].fold(mav.status_text("Preflight Fail: ekf2 missing data", severity=3), desk.station.now_s)
+    unready, ready = await table_of(desk)
+    assert (unready.phase, unready.reason) == (("not ready", Tone.WARN), "Preflight Fail: ekf2 missing data")
+    assert ready.phase[0] == "waiting"
+    desk.vehicles[1].fold(mav.system_status(ready=True), desk.station.now_s)
+    assert (await table_of(desk))[0].phase[0] == "waiting"
 
 
 async def test_a_row_tells_whether_its_vehicle_signs():
