@@ -5,7 +5,7 @@ import io
 from pathlib import Path
 
 from PIL import Image
-from playwright.async_api import Browser, async_playwright
+from playwright.async_api import Browser, FloatRect, async_playwright
 
 from tests.browser.chromium import ARGUMENTS, find_chromium
 from tests.browser.conftest import LARGE, serving, tab
@@ -21,8 +21,10 @@ PICTURES = (
 )
 """File, mission, how much of the plan has been flown, and whether the page is light."""
 SETTLE_MS = 3000
-FRAMES, FRAME_S, FRAME_MS, FRAME_PX, COLOURS = 30, 0.2, 150, (820, 482), 96
+FRAMES, FRAME_S, FRAME_MS, FRAME_PX, COLOURS = 30, 0.2, 150, (615, 389), 96
 """Of the animation: how many, flown in between [s], how long each is shown, its size, and its colours."""
+SCENE_PX = FloatRect(x=340, y=0, width=1020, height=645)
+"""What it shows of the window: the scene alone, since its colours do not do for letters."""
 STEP_S = 0.05
 
 
@@ -56,7 +58,7 @@ async def animation(browser: Browser) -> None:
                 scripted.say()
                 scripted.sample()
             await page.wait_for_timeout(600)
-            shown = Image.open(io.BytesIO(await page.screenshot())).convert("RGB").resize(FRAME_PX)
+            shown = Image.open(io.BytesIO(await page.screenshot(clip=SCENE_PX))).convert("RGB").resize(FRAME_PX)
             frames.append(shown.quantize(COLOURS, dither=Image.Dither.NONE))
     frames[0].save(IMAGES / "flight.gif", save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0)
 
