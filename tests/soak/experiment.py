@@ -20,14 +20,18 @@ def fly(scenario: Scenario, seed: int) -> tuple[WholeSystem, FlightReport, Row]:
     )
     report = system.fly()
     broken = violations(scenario, system, report)
-    return system, report, {
-        "story": scenario.story,
-        "violations": " | ".join(broken),
-        "success": report.success,
-        "reason": report.reason,
-        "simulated_s": round(system.simulator.time_s, 2),
-        "fingerprint": fingerprint(system),
-    }
+    return (
+        system,
+        report,
+        {
+            "story": scenario.story,
+            "violations": " | ".join(broken),
+            "success": report.success,
+            "reason": report.reason,
+            "simulated_s": round(system.simulator.time_s, 2),
+            "fingerprint": fingerprint(system),
+        },
+    )
 
 
 def fingerprint(system: WholeSystem) -> str:
