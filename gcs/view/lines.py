@@ -23,8 +23,10 @@ CHUNK = 10
 """Points of a trail that stay live; when there are more, they are sealed."""
 AHEAD = 16
 """Points of the line that shows what a companion is about to fly."""
-BATCH, MERGE, MOST_SEGMENTS = 320, 8, 20_000
+BATCH, MERGE, MOST_SEGMENTS = 320, 8, 2_560
 """Sealed segments go out in batches; `MERGE` batches become one line, until it has more than `MOST_SEGMENTS`."""
+MOST_OF_ALL = 40_000
+"""Segments of all lines; the oldest ones are taken away then, so that a browser can come late in any flight."""
 CATCH_UP = 6
 """Of a trail that has grown by no more points than this since the last look, the newest one is enough."""
 
@@ -47,12 +49,13 @@ class FleetTrails:
     def take(self, trails: Sequence[Trail | None]) -> list[tuple[int, Array]]:
         """Take in new samples; (vehicle's index, (CHUNK + 1, 3) points) for each chunk that has become full."""
         counts = np.array([len(trail.times_s) if trail is not None else 0 for trail in trails], dtype=int)
-        chunks: list[tuple[int, Array]] = []
+        late: list[list[tuple[int, Array]]] = []
         for index in np.flatnonzero(counts - self._read > CATCH_UP).tolist():
             trail = trails[index]
             assert trail is not None
-            chunks += self._catch_up(index, trail.positions_m(self._read[index]))
+            late.append(self._catch_up(index, trail.positions_m(self._read[index])))
             self._read[index] = counts[index]
+        chunks = _oldest_first(late)
         grown = np.flatnonzero(counts > self._read)
         if len(grown):
             newest = [trail.newest_m for index in grown.tolist() if (trail := trails[index]) is not None]
@@ -93,6 +96,12 @@ class FleetTrails:
         self._tails_m[indices, live] = points_m
         self._live[indices] = live + 1
         return chunks
+
+
+def _oldest_first(late: list[list[tuple[int, Array]]]) -> list[tuple[int, Array]]:
+    """The chunks of several vehicles in one row, as they would have come while the vehicles flew."""
+    longest = max((len(own) for own in late), default=0)
+    return [own[-back] for back in range(longest, 0, -1) for own in late if len(own) >= back]
 
 
 def thinned(chunks_m: Array, tolerance_m: float) -> npt.NDArray[np.bool_]:
@@ -173,6 +182,8 @@ class SealedLines:
             )
         self._lines.append(line)
         new.append(line)
+        while sum(len(line.segments) for line in self._lines) > MOST_OF_ALL:
+            gone.append(self._lines.pop(0))
         self._filled = 0
 
     def _named(self, segments: Array, colours: Colours, rank: int) -> SealedLine:

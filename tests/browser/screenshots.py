@@ -1,9 +1,11 @@
 """The pictures of the page in the documents: `make screenshots`."""
 
 import asyncio
+import io
 from pathlib import Path
 
-from playwright.async_api import Browser, async_playwright
+from PIL import Image
+from playwright.async_api import Browser, FloatRect, async_playwright
 
 from tests.browser.chromium import ARGUMENTS, find_chromium
 from tests.browser.conftest import LARGE, serving, tab
@@ -19,6 +21,11 @@ PICTURES = (
 )
 """File, mission, how much of the plan has been flown, and whether the page is light."""
 SETTLE_MS = 3000
+FRAMES, FRAME_S, FRAME_MS, FRAME_PX, COLOURS = 30, 0.2, 150, (615, 389), 96
+"""Of the animation: how many, flown in between [s], how long each is shown, its size, and its colours."""
+SCENE_PX = FloatRect(x=340, y=0, width=1020, height=645)
+"""What it shows of the window: the scene alone, since its colours do not do for letters."""
+STEP_S = 0.05
 
 
 async def picture(browser: Browser, file: str, mission: str, share: float, *, light: bool) -> None:
@@ -36,12 +43,34 @@ async def picture(browser: Browser, file: str, mission: str, share: float, *, li
         await page.screenshot(path=IMAGES / file, type="jpeg", quality=86)
 
 
+async def animation(browser: Browser) -> None:
+    """Draw a flight, frame by frame."""
+    scripted, frames = ScriptedDesk("indoor"), list[Image.Image]()
+    scripted.pace = 0.0
+    await scripted.begin(at_s=[STEP_S, STEP_S])
+    async with serving(scripted) as port, tab(browser, port, LARGE) as page:
+        await page.wait_for_timeout(2 * SETTLE_MS)
+        await page.locator(".mantine-Notification-closeButton").first.click()
+        for _ in range(FRAMES):
+            for _ in range(round(FRAME_S / STEP_S)):
+                for vehicle in scripted.vehicles:
+                    vehicle.fly_on(STEP_S)
+                scripted.say()
+                scripted.sample()
+            await page.wait_for_timeout(600)
+            shown = Image.open(io.BytesIO(await page.screenshot(clip=SCENE_PX))).convert("RGB").resize(FRAME_PX)
+            frames.append(shown.quantize(COLOURS, dither=Image.Dither.NONE))
+    frames[0].save(IMAGES / "flight.gif", save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0)
+
+
 async def main() -> None:
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=find_chromium(), args=ARGUMENTS)
         for file, mission, share, light in PICTURES:
             await picture(browser, file, mission, share, light=light)
             print(IMAGES / file)
+        await animation(browser)
+        print(IMAGES / "flight.gif")
         await browser.close()
 
 

@@ -15,8 +15,11 @@ BOW_SHARE = 0.12
 def scripted_plan(mission: Mission) -> FleetPlan:
     """A plan for all vehicles of a mission; nobody has checked it for obstacles."""
     targets = {target.name: target for target in mission.targets}
-    chosen = mission.allocation or {v.name: t.name for v, t in zip(mission.vehicles, mission.targets, strict=False)}
-    parts = [_part(mission, vehicle, targets[chosen[vehicle.name]], i) for i, vehicle in enumerate(mission.vehicles)]
+    chosen = mission.routes or {v.name: (t.name,) for v, t in zip(mission.vehicles, mission.targets, strict=False)}
+    parts = [
+        _part(mission, vehicle, targets[chosen[vehicle.name][0]], index)
+        for index, vehicle in enumerate(mission.vehicles)
+    ]
     return FleetPlan(
         mission=mission.name,
         algorithm="scripted",

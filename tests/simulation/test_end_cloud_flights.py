@@ -57,9 +57,11 @@ def test_the_companions_alone_find_their_way(seed: int):
     assert_flown_as_the_mission_wants(system)
 
 
-@pytest.mark.parametrize("at_s", [0.5, 2.0, 3.5, 5.0, 6.5])
-def test_when_a_companion_dies_its_vehicle_holds_and_the_other_goes_on(at_s: float):
-    system = WholeSystem(INDOOR, seed=3, faults=(CompanionKill(vehicle=1, at_s=at_s),))
+@pytest.mark.parametrize(
+    ("mode", "at_s"), [*((PlanningMode.END_CLOUD, s) for s in (0.5, 2.0, 3.5, 5.0, 6.5)), (PlanningMode.ONBOARD, 3.5)]
+)
+def test_when_a_companion_dies_its_vehicle_holds_and_the_other_goes_on(mode: PlanningMode, at_s: float):
+    system = WholeSystem(INDOOR, mode, seed=3, faults=(CompanionKill(vehicle=1, at_s=at_s),))
     report = system.fly()
     alpha, bravo = report.vehicles
     assert not report.success

@@ -6,9 +6,10 @@ import pytest
 
 from gcs.flight.report import min_clearance_m
 from gcs.mapping.observed_map import ObservedMap
+from gcs.planner import plan_mission
 from gcs.settings import PlanningMode
 from missions import obstacles
-from missions.mission import load_mission
+from missions.mission import Mission, load_mission
 from missions.occupancy import OccupancyBlock, blocks_of, voxels_of
 from missions.world import Cylinder, World
 from tests.experiments.modes.scenarios import Difference, Link, scenario
@@ -53,11 +54,16 @@ def in_the_way_of(sysid: int, share: float) -> Cylinder:
     )
 
 
+def with_pillar(mission: Mission, pillar: Cylinder) -> Mission:
+    return msgspec.structs.replace(
+        mission, world=msgspec.structs.replace(mission.world, cylinders=(*mission.world.cylinders, pillar))
+    )
+
+
 @pytest.fixture(scope="module")
 def rehearsal() -> Rehearsal:
     pillar = in_the_way_of(1, 0.62)
-    world = msgspec.structs.replace(INDOOR.world, cylinders=(*INDOOR.world.cylinders, pillar))
-    system = Rehearsal(msgspec.structs.replace(INDOOR, world=world))
+    system = Rehearsal(with_pillar(INDOOR, pillar))
     system.pillar = pillar
     return system
 
@@ -73,6 +79,22 @@ def test_a_vehicle_is_led_around_what_another_has_seen(rehearsal: Rehearsal):
     assert obstacles.clearance(flown.positions_m, solid).min() >= 0.4
     accelerations = np.diff(flown.velocities_m_s, axis=0) / np.diff(flown.times_s)[:, None]
     assert np.linalg.norm(accelerations, axis=1).max() < 6.0
+
+
+@pytest.mark.slow
+def test_ten_vehicles_fly_a_new_plan_within_three_seconds():
+    ten = load_mission("fleet-10")
+    curve_m = plan_mission(ten, seed=0).vehicles[4].curve_m
+    east_m, north_m, _ = curve_m[int(0.65 * len(curve_m))].tolist()
+    pillar = Cylinder(name="pillar", centre_m=(east_m, north_m), radius_m=0.3, top_m=4.0, known=False)
+    system = Rehearsal(with_pillar(ten, pillar))
+    system.pillar, system.seen_at_s = pillar, 20.0
+    report = system.fly()
+    assert report.success, report.reason
+    assert report.cloud_replans >= 1
+    assert report.swap_s_p50 is not None
+    assert report.swap_s_p50 <= 3.0
+    assert not system.simulator.collisions
 
 
 def test_what_stands_in_nobodys_way_changes_nothing():

@@ -10,6 +10,7 @@ from gcs.view.lines import (
     BATCH,
     CHUNK,
     MERGE,
+    MOST_OF_ALL,
     AheadLine,
     Array,
     FleetTrails,
@@ -141,6 +142,25 @@ def test_a_long_flight_is_few_lines_and_none_of_it_is_lost():
     np.testing.assert_array_equal(begins, np.arange(10.0 * chunks))
     for line in standing.values():
         np.testing.assert_array_equal(line.colours[:, 0, 0], (line.segments[:, 0, 0] // 10) % 256)
+
+
+def test_of_the_longest_flights_the_oldest_part_is_taken_away():
+    standing = seal(SealedLines(), 2 * MOST_OF_ALL // 10)
+    segments = np.concatenate([line.segments for line in standing.values()])
+    assert MOST_OF_ALL - MERGE * BATCH < len(segments) <= MOST_OF_ALL
+    newest_m = 2.0 * MOST_OF_ALL - BATCH
+    np.testing.assert_array_equal(np.sort(segments[:, 0, 0]), np.arange(newest_m - len(segments), newest_m))
+
+
+def test_a_page_that_comes_late_takes_in_the_oldest_of_all_vehicles_first():
+    chunks = FleetTrails(2, 0.05).take([flown(20.0), flown(10.0)])
+    owners = [index for index, _ in chunks]
+    assert owners.count(0) > owners.count(1) > 1
+    assert owners[0] == 0
+    assert owners[-2:] == [0, 1]
+    last_m = {index: points_m[-1, 0] for index, points_m in chunks}
+    assert last_m[0] == pytest.approx(20.0, abs=1.1)
+    assert last_m[1] == pytest.approx(10.0, abs=1.1)
 
 
 def companion(state: CompanionState = CompanionState.FLYING, revision: int = 1, end_m: float = 8.0) -> CompanionView:
