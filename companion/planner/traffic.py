@@ -19,8 +19,8 @@ PREDICTED_S = 3.0
 """Movers are expected to go straight on for so long."""
 GROWTH_M_S, MOST_GROWTH_M = 0.1, 0.25
 """What is predicted grows, for it may turn."""
-PARTING_M_S = 0.3
-"""Who is nearer to a neighbour than allowed leaves it at least this fast."""
+PARTING_M_S, PARTING_AFTER_S = 0.3, 1.0
+"""Who is nearer to a neighbour than allowed comes no nearer, and leaves it at least this fast once it has set out."""
 
 RADIUS, APART, TOUCHING, HAD = range(4)
 """Columns of a body: radius of a mover (0 for a neighbour); distance to be kept to a neighbour (0 for a mover), and in
@@ -134,6 +134,6 @@ def crowding(east: float, north: float, up: float, time_s: float, in_zone: bool,
     for b in range(len(moving.bodies)):
         apart_m = moving.bodies[b, TOUCHING] if in_zone else moving.bodies[b, APART]
         if apart_m > 0.0:
-            apart_m = min(apart_m, moving.bodies[b, HAD] + PARTING_M_S * time_s)
+            apart_m = min(apart_m, moving.bodies[b, HAD] + PARTING_M_S * max(time_s - PARTING_AFTER_S, 0.0))
             lacks += max(apart_m - body_distance(east, north, up, time_s, b, moving), 0.0)
     return lacks

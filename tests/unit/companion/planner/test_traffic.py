@@ -6,7 +6,7 @@ import pytest
 from companion.fleet.neighbour import Neighbour
 from companion.mapping.movers import Mover
 from companion.planner.planner import PlanRequest
-from companion.planner.traffic import body_distance, crowding, mover_clearance, traffic
+from companion.planner.traffic import PARTING_AFTER_S, PARTING_M_S, body_distance, crowding, mover_clearance, traffic
 from missions.mission_items import Track
 from missions.trajectory import Motion, Trajectory, at_rest
 from missions.tunnel import TrajectoryKind
@@ -49,6 +49,22 @@ def test_separation_grows_with_what_is_uncertain_and_touching_counts_in_launch_z
     assert crowding(2.4, 3.0, 1.5, 1.0, False, certain) == pytest.approx(LIMITS.separation_m - 0.6)
     assert crowding(2.4, 3.0, 1.5, 1.0, False, vague) == pytest.approx(LIMITS.separation_m + 0.5 - 0.6)
     assert crowding(2.4, 3.0, 1.5, 1.0, True, certain) == 0.0
+
+
+def test_who_is_too_near_may_set_out_at_its_own_pace_but_comes_no_nearer_and_leaves():
+    beside = at_rest(np.array([3.0, 3.0, 1.5]), 0.0)
+    too_near = traffic((), (neighbour(beside),), LIMITS, 0.0, 5.0, np.array([2.5, 3.0, 1.5]))
+    assert crowding(2.5, 3.0, 1.5, PARTING_AFTER_S, False, too_near) == 0.0
+    assert crowding(2.6, 3.0, 1.5, 0.5, False, too_near) == pytest.approx(0.1)
+    assert crowding(2.5, 3.0, 1.5, PARTING_AFTER_S + 1.0, False, too_near) == pytest.approx(PARTING_M_S)
+
+
+def test_a_vehicle_finds_out_of_a_neighbours_circle_from_rest():
+    planner = make_planner()
+    guide = planner.lay_guide(Track(GOAL_M[None], np.array([3.0])), 0, START_M)
+    silent = neighbour(at_rest(START_M + [-0.6, 0.2, 0.0], 0.0), 0.95)
+    resting = Motion(START_M, np.zeros(3), np.zeros(3))
+    assert planner.plan(PlanRequest(0, resting, 0.0, guide, 0.0, neighbours=(silent,))).trajectory is not None
 
 
 def test_a_plan_keeps_its_distance_from_a_neighbour_that_crosses_at_the_same_time():
