@@ -17,7 +17,8 @@ Array = npt.NDArray[np.float64]
 EASING = 0.5
 """Required clearance and height grow by this much per metre from what the start (or the goal) has."""
 EASED_SHARE = 0.5
-"""A start counts as having less than it has by this share of the reserve: just beside it the map may say less."""
+"""An end counts as having less than it has by this share of the reserve: just beside it the map may say less. It never
+counts as touching where it does not."""
 ROUNDING_M = 1e-6
 
 
@@ -118,7 +119,10 @@ def ends_of(start_m: Array, goal_m: Array, around: Surroundings, limits: FlightL
         ends[0, axis], ends[1, axis] = start_m[axis], goal_m[axis]
     for i in range(2):
         east, north, up = ends[i, 0], ends[i, 1], ends[i, 2]
-        ends[i, END_CLEARANCE] = free_at(east, north, up, around) - EASED_SHARE * limits.reserve_m
+        free_m = free_at(east, north, up, around)
+        ends[i, END_CLEARANCE] = max(
+            free_m - EASED_SHARE * limits.reserve_m, min(free_m, limits.contact_m) - ROUNDING_M
+        )
         if i == 0:
             ends[i, END_CLEARANCE] = min(ends[i, END_CLEARANCE], mover_clearance(east, north, up, 0.0, around.moving))
         ends[i, END_HEIGHT] = up - terrain_height_at(east, north, around.obstacles) - ROUNDING_M
