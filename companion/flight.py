@@ -14,7 +14,7 @@ from companion.events import Odometry
 from companion.instructions import Instruction
 from companion.planner.guide import Guide
 from companion.planner.planner import Plan, PlanRequest
-from companion.setpoints import Heading, Setpoint, within_speed
+from companion.setpoints import Heading, Setpoint
 from companion.traffic import Traffic
 from missions.frames import AutopilotFrame
 from missions.mission_items import Track
@@ -30,8 +30,6 @@ HOVER_LONGER_S = 0.2
 """A vehicle whose first plan has to be announced hovers until then, and for so long if the plan is withdrawn."""
 BRAKES_EARLIER_S = 0.3
 """A collision with another vehicle is braked for so much before it has to be; until then it is planned around."""
-CATCHING_UP_SHARE = 0.97
-"""Of the mission's speed: what an autopilot may aim at to catch up; the rest is for its overshoot."""
 BLIND = {Reason.NO_POSITION, Reason.NO_SENSOR}
 """Whoever does not know where it is, or what is around, makes no plans."""
 
@@ -171,9 +169,7 @@ class Flight:
         ahead = self.course.motion_ned(used_s + self._crew.settings.response_lead_s)
         yaw_rad = self._heading.follow(motion.velocity_m_s, now_s - self._last_s)
         self._last_s = now_s
-        setpoint = Setpoint(motion.position_m, ahead.velocity_m_s, ahead.acceleration_m_s2, yaw_rad)
-        estimate_m = self._odometry.position_m + (used_s - self._odometry.time_s) * self._odometry.velocity_m_s
-        return within_speed(setpoint, estimate_m, CATCHING_UP_SHARE * self._crew.mission.limits.cruise_speed_m_s)
+        return Setpoint(motion.position_m, ahead.velocity_m_s, ahead.acceleration_m_s2, yaw_rad)
 
     def _announcement(self, trajectory: Trajectory, kind: TrajectoryKind) -> instructions.SendTrajectory:
         """What is told to the others about a trajectory; its time is vehicle time still."""

@@ -10,7 +10,7 @@ from companion.briefing import Briefing
 from companion.errors import UsageError
 from companion.figures import Quantiles
 from companion.journal import Journal
-from companion.setpoints import POSITION_GAIN_HZ, Heading, Setpoint, in_ned, within_speed
+from companion.setpoints import Heading, in_ned
 from companion.vehicle_clock import LONGEST_EXTRAPOLATION_S, VehicleClock
 from missions.frames import AutopilotFrame, swap_enu_ned
 from missions.trajectory import Trajectory
@@ -205,26 +205,3 @@ def test_the_journal_is_json_lines_with_vehicle_time(tmp_path: Path):
 def test_a_log_that_cannot_be_written_is_bad_usage(tmp_path: Path):
     with pytest.raises(UsageError, match=r"nowhere/log\.jsonl: cannot be written: No such file"):
         Journal(1, tmp_path / "nowhere" / "log.jsonl")
-
-
-def aimed_at_m_s(setpoint: Setpoint, vehicle_m: np.ndarray) -> float:
-    """The horizontal speed that a PX4 makes of a setpoint."""
-    error_m = setpoint.position_m - vehicle_m
-    return float(np.linalg.norm((setpoint.velocity_m_s + POSITION_GAIN_HZ * error_m)[:2]))
-
-
-@pytest.mark.parametrize("behind_m", [[-2.0, 0.0, 0.0], [-1.0, 1.5, 0.5], [0.4, -3.0, 0.0]])
-def test_a_vehicle_that_is_behind_catches_up_no_faster_than_the_limit(behind_m: list[float]):
-    setpoint = Setpoint(np.array([4.0, 2.0, -1.5]), np.array([2.7, 0.3, 0.1]), np.zeros(3), 0.3)
-    vehicle_m = setpoint.position_m + behind_m
-    assert aimed_at_m_s(setpoint, vehicle_m) > 2.9
-    governed = within_speed(setpoint, vehicle_m, 2.9)
-    assert aimed_at_m_s(governed, vehicle_m) == pytest.approx(2.9)
-    assert governed.position_m[2] == setpoint.position_m[2]
-    np.testing.assert_array_equal(governed.velocity_m_s, setpoint.velocity_m_s)
-
-
-def test_a_vehicle_that_follows_well_or_is_ahead_gets_the_trajectorys_own_setpoint():
-    setpoint = Setpoint(np.array([4.0, 2.0, -1.5]), np.array([2.7, 0.3, 0.1]), np.zeros(3), 0.3)
-    for off_m in ([-0.1, 0.05, 0.2], [1.0, 0.0, 0.0]):
-        assert within_speed(setpoint, setpoint.position_m + off_m, 2.9) is setpoint
