@@ -73,7 +73,7 @@ bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK a
 
 SEED0 ?= 0
 soak: $(VENV)/.installed-dev  ## whole flights with everything going wrong, in process: make soak SEEDS=100 [SEED0=M]
-	$(BIN)/python -m tests.soak --seeds $(SEEDS) --seed0 $(SEED0)
+	$(BIN)/python -m tests.soak --seeds $(if $(findstring :,$(SEEDS)),100,$(SEEDS)) --seed0 $(SEED0)
 
 SECONDS ?= 60
 fuzz: $(VENV)/.installed-dev  ## hostile traffic on all receive paths: make fuzz SECONDS=60

@@ -17,7 +17,7 @@ FLIGHT_S = 120.0
 def flown(directory: Path, *arguments: str) -> dict[str, Any]:
     """The report of a flight that has kept its promises, by the truth log."""
     ports = ("--instance-base", str(programs.instance_base()))
-    order = ("gcs", "fly", MISSION, "--sim", "--headless", "--speed", "5", "--report", str(directory))
+    order = ("gcs", "fly", MISSION, "--sim", "--headless", "--speed", "2", "--report", str(directory))
     finished = programs.run(*order, *ports, *arguments, timeout_s=FLIGHT_S)
     assert finished.code == 0, finished.output
     assert programs.promises_broken(directory, MISSION) == []
