@@ -21,6 +21,8 @@ STANDING_M_S = 0.3
 """Who is slower may leave in any direction."""
 ROUNDS, SMOOTHINGS = 4, 3
 """Rounding: as often the path is pushed off obstacles, each time after so many smoothings: about a knot's length."""
+SETTLINGS = 8
+"""Then it is smoothed and pushed in turn so often: a push alone leaves kinks, which would have to be flown slowly."""
 PUSHED_FARTHER_M = 0.02
 PROBE_M = 0.01
 """How the path is pushed off obstacles: what is added for the rounding between them, step of the slope."""
@@ -154,8 +156,9 @@ def relax(path: Array, n_pinned: int, limits: FlightLimits, around: Surroundings
         for _ in range(SMOOTHINGS):
             smooth(path, n_pinned, moved)
         push(path, n_pinned, limits, around, free_m)
-    smooth(path, n_pinned, moved)
-    push(path, n_pinned, limits, around, free_m)
+    for _ in range(SETTLINGS):
+        smooth(path, n_pinned, moved)
+        push(path, n_pinned, limits, around, free_m)
 
 
 @compiled

@@ -10,7 +10,7 @@ from missions.kernels import compiled
 Array = npt.NDArray[np.float64]
 
 CHECKS_PER_SEGMENT = 6
-SLACK_SHARE = 0.25
+SLACK_SHARE = 0.2
 """Of the reserve: a search looks at fewer places, and what lacks between these is this at most."""
 
 
