@@ -17,8 +17,8 @@ Array = npt.NDArray[np.float64]
 EASING = 0.5
 """Required clearance and height grow by this much per metre from what the start (or the goal) has."""
 EASED_SHARE = 0.5
-"""An end counts as having less than it has by this share of the reserve: just beside it the map may say less. It never
-counts as touching where it does not."""
+"""Of what was seen an end counts as having less than it has by this share of the reserve: just beside it the map may
+say less. It never counts as touching where it does not."""
 ROUNDING_M = 1e-6
 
 

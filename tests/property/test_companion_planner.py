@@ -5,7 +5,6 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from companion.planner.limits import EASED_SHARE, EASING, flight_limits
 from companion.planner.planner import Planner, PlanRequest
 from companion.settings import Reserve, SearchSettings
 from missions import obstacles
@@ -56,9 +55,7 @@ def assert_safe(trajectory: Trajectory, room: Mission) -> None:
     free_m = obstacles.clearance(motion.position_m, obstacles.pack(room.world))
     from_start_m = np.linalg.norm(motion.position_m - motion.position_m[0], axis=1)
     from_end_m = np.linalg.norm(motion.position_m - motion.position_m[-1], axis=1)
-    slack_m = EASED_SHARE * flight_limits(INDOOR, Reserve()).reserve_m
-    had_m = np.maximum(free_m[[0, -1]] - slack_m, np.minimum(free_m[[0, -1]], LIMITS.body_radius_m))
-    eased_m = np.minimum(had_m[0] + EASING * from_start_m, max(had_m[1], LIMITS.body_radius_m) + EASING * from_end_m)
+    eased_m = np.minimum(free_m[0] + 0.5 * from_start_m, max(free_m[-1], LIMITS.body_radius_m) + 0.5 * from_end_m)
     assert np.all(free_m >= np.minimum(LIMITS.clearance_m, eased_m) - 0.02)
     assert free_m.min() >= min(LIMITS.body_radius_m, free_m[0]) - 1e-6
     speed = np.linalg.norm(motion.velocity_m_s, axis=1)
