@@ -48,6 +48,9 @@ COMPANION, AUTOPILOT = 191, 1
 """MAVLink component ids."""
 SETUP_RETRY_S = 2.0
 """Between two rounds of asking for streams and for the origin, until the origin is known (wall clock)."""
+LOOK_INTERVAL_S = 0.1
+"""Between two looks at who is there (wall clock). MAVSDK would call back, too, but a subscription takes effect a little
+after it was made, and a system that connects in between is never reported: a companion waited for ever."""
 
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, MISSION_START = 511, 512, 300
 GPS_GLOBAL_ORIGIN = 49
@@ -77,8 +80,9 @@ class Px4:
         self._direct: dict[int, MavlinkDirect] = {}
         self._offboard: Offboard | None = None
         self._reset_counter = 0
+        self._watch: asyncio.Task[None] | None = None
         self._setup: asyncio.Task[None] | None = None
-        self._has_origin = False
+        self._connected = self._has_origin = False
         self.dropped: Counter[str] = Counter()
         """Messages that could not be read, by name."""
 
@@ -92,15 +96,16 @@ class Px4:
         configuration = Configuration.create_with_component_type(ComponentType.COMPANION_COMPUTER)
         configuration.system_id, configuration.component_id = self._sysid, COMPANION
         self._mavsdk = Mavsdk(configuration)
-        self._mavsdk.subscribe_on_new_system(lambda _: self._soon(self._look_around))
         result = self._mavsdk.add_any_connection(self._url)
         if result != ConnectionResult.SUCCESS:
             raise UsageError(f"--system {self._url}: {ConnectionResult(result).name.lower().replace('_', ' ')}")
+        self._watch = self._loop.create_task(self._keep_looking(), name="systems")
 
     def close(self) -> None:
         """End everything; see `Autopilot.close`."""
-        if self._setup is not None:
-            self._setup.cancel()
+        for task in (self._watch, self._setup):
+            if task is not None:
+                task.cancel()
         mavsdk, self._mavsdk = self._mavsdk, None
         if mavsdk is not None:
             mavsdk.destroy()
@@ -109,10 +114,19 @@ class Px4:
         """The next event; see `Autopilot.receive`."""
         return await self._events.get()
 
-    def _look_around(self) -> None:
-        """A system has turned up: our autopilot, a ground station through it, or somebody else."""
-        assert self._mavsdk is not None
-        for system in self._mavsdk.get_systems():
+    async def _keep_looking(self) -> None:
+        while self._mavsdk is not None:
+            self._look_around(self._mavsdk)
+            if self._system is not None and (connected := self._system.is_connected()) is not self._connected:
+                self._connected = connected
+                self._on_connected()
+            await asyncio.sleep(LOOK_INTERVAL_S)
+
+    def _look_around(self, mavsdk: Mavsdk) -> None:
+        """Listen to whoever has turned up: our autopilot, a ground station through it, or somebody else."""
+        if mavsdk.system_count() == len(self._direct):
+            return
+        for system in mavsdk.get_systems():
             sysid = system.get_system_id()
             if sysid in self._direct:
                 continue
@@ -130,15 +144,12 @@ class Px4:
             direct.subscribe_message("OBSTACLE_DISTANCE", lambda message, _: self._soon(self._on_ring, message))
         for name in EVENTS_OF:
             direct.subscribe_message(name, lambda message, _: self._soon(self._on_message, message))
-        system.subscribe_is_connected(lambda connected, _: self._soon(self._on_connected, connected))
-        if system.is_connected():
-            self._on_connected(True)
 
-    def _on_connected(self, connected: bool) -> None:
+    def _on_connected(self) -> None:
         if self._setup is not None:
             self._setup.cancel()
-        self._events.put_nowait(AutopilotFound() if connected else AutopilotLost())
-        self._setup = self._loop.create_task(self._ask_for_streams(), name="streams") if connected else None
+        self._events.put_nowait(AutopilotFound() if self._connected else AutopilotLost())
+        self._setup = self._loop.create_task(self._ask_for_streams(), name="streams") if self._connected else None
 
     async def _ask_for_streams(self) -> None:
         """Ask until the origin is known: the autopilot may still be booting."""
