@@ -5,8 +5,8 @@ import numpy as np
 from companion.fleet.neighbour import Neighbour
 from companion.mapping.local_map import LocalMap
 from companion.mapping.sorting import Known
+from companion.planner.detours import blocked_samples, first_blocked_piece
 from companion.planner.grid_search import straighten, way_around
-from companion.planner.guide import blocked_samples, first_blocked_piece
 from companion.planner.limits import ends_of
 from companion.planner.planner import Planner, PlanRequest
 from companion.sensing.scan import Scan

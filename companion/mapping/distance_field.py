@@ -19,10 +19,13 @@ Bytes = npt.NDArray[np.uint8]
 VOXELS_PER_NODE = 2
 SATURATED = 255
 """A node's value from which on nothing is near."""
+GROWN_VOXELS = 0.25
+"""What is hit lies anywhere in its voxel, and between nodes distances are read a little too long: so much is taken off
+them."""
 
 
 class Field(NamedTuple):
-    """Distances to the nearest occupied voxel's centre, in steps, up to `SATURATED` steps."""
+    """Distances to the nearest occupied voxel's centre less a quarter of a voxel, in steps, at most `SATURATED`."""
 
     values: Bytes
     """(a, b, c) nodes; (0, 0, 0) where nothing senses."""
@@ -45,11 +48,12 @@ def templates(reach_nodes: int) -> Bytes:
     Row `o` of an axis belongs to the node `o - reach_nodes` after the voxel's own; s = 2 reach_nodes + 2. The value
     `SATURATED` stands for a distance of `reach_nodes` + 1/4 spacings.
     """
-    offsets = np.arange(-reach_nodes, reach_nodes + 2)
+    offsets, grown = np.arange(-reach_nodes, reach_nodes + 2), GROWN_VOXELS / VOXELS_PER_NODE
     out = []
     for way in range(8):
         parts = [(offsets - (0.75 if way >> axis & 1 else 0.25)) ** 2 for axis in range(3)]
         distance = np.sqrt(parts[0][:, None, None] + parts[1][None, :, None] + parts[2][None, None, :])
+        distance = np.maximum(distance - grown, 0.0)
         out.append(np.minimum(np.floor(distance * SATURATED / (reach_nodes + 0.25)), SATURATED))
     return np.array(out).astype(np.uint8)
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from companion.mapping.distance_field import SATURATED, VOXELS_PER_NODE, lower
+from companion.mapping.distance_field import GROWN_VOXELS, SATURATED, VOXELS_PER_NODE, lower
 from missions.kernels import compiled
 
 Array = npt.NDArray[np.float64]
@@ -106,7 +106,7 @@ def see_through(grid: Grid, sensor_m: Array, ends_m: Array) -> Integers:
             a, b, c = int(0.5 * x + 0.5), int(0.5 * y + 0.5), int(0.5 * z + 0.5)
             if x < 0.0 or y < 0.0 or z < 0.0 or a >= field.shape[0] or b >= field.shape[1] or c >= field.shape[2]:
                 break
-            free = float(field[a, b, c]) * step - HALF_DIAGONAL - CORE
+            free = float(field[a, b, c]) * step + GROWN_VOXELS - HALF_DIAGONAL - CORE
             if free > 0.5:
                 t += free
                 continue
@@ -200,7 +200,7 @@ def _rebuild_block(grid: Grid, block: int) -> None:
     for a in range(NODES):
         for b in range(NODES):
             for c in range(NODES):
-                value = min(int(np.sqrt(squared[a, b, c]) * scale), SATURATED)
+                value = min(int(max(np.sqrt(squared[a, b, c]) - GROWN_VOXELS, 0.0) * scale), SATURATED)
                 grid.field[low[0] + a, low[1] + b, low[2] + c] = value
 
 

@@ -1,7 +1,8 @@
 """A way around what blocks the guide: A* on a grid, then straightened. Asked only when the guide itself is blocked.
 
 The cost of a way is its time at the speeds that the mission's rule allows: obstacles are passed slowly or far off. A
-cell is looked at when the search comes to it, not before.
+cell is looked at when the search comes to it, not before. Ways beside things are looked for first, on a sheet from
+start to goal that is one cell thick; ways over and under them only where going beside them takes much longer.
 """
 
 import heapq
@@ -16,6 +17,12 @@ from missions.kernels import compiled
 Array = npt.NDArray[np.float64]
 
 MAX_CELLS = 60_000
+QUICK_CELLS = 4_000
+"""A quick search in space gives up when it has gone on from so many cells: a few milliseconds."""
+BESIDE_IS_WELL = 1.5
+"""A way on the sheet that takes at most this multiple of the straight line's time is not compared with any other."""
+STEEPEST_SHEET = 0.5
+"""Share of the steepest climb that a sheet may have."""
 CELL_MARGIN = 0.25
 """Cells need so much more clearance, as a share of their size: the way between two cells is clear as well."""
 FADED_CELLS = 6.0
@@ -41,6 +48,8 @@ def way_around(
     around: Surroundings,
     *,
     narrow: bool = False,
+    flat: bool = False,
+    quick: bool = False,
 ) -> Array:
     """The quickest way from one place to another.
 
@@ -52,12 +61,31 @@ def way_around(
         limits: clearance and speeds.
         around: what is in the way, and the flight range.
         narrow: go where cells have no more clearance than what is required.
+        flat: go over or under things only where going beside them is possible, but takes longer.
+        quick: give up early, as who is in flight has to.
 
     Returns:
         (m, 3) corners from start to goal; (0, 3) when there is no way.
     """
     start_m, goal_m = np.asarray(start_m, dtype=float), np.asarray(goal_m, dtype=float)
-    return find_way(start_m, goal_m, room_m, cell_m, 0.0 if narrow else CELL_MARGIN, limits, around)
+    margin, most_cells = 0.0 if narrow else CELL_MARGIN, QUICK_CELLS if quick else MAX_CELLS
+    return find_way(start_m, goal_m, room_m, cell_m, margin, flat, most_cells, limits, around)
+
+
+class Lattice(NamedTuple):
+    """Where cells lie."""
+
+    low_m: Array
+    """(3,) the first cell, ENU."""
+    cell_m: float
+    shape: npt.NDArray[np.int64]
+    """(3,) number of cells."""
+    tilt: Array
+    """(2,) how steeply its layers rise to the east and to the north."""
+    first: npt.NDArray[np.int64]
+    """(3,) the cell where ways begin; it may be blocked itself."""
+    last: npt.NDArray[np.int64]
+    """(3,) where they end; likewise."""
 
 
 @compiled
@@ -67,65 +95,81 @@ def find_way(
     room_m: float,
     cell_m: float,
     margin: float,
+    flat: bool,
+    most_cells: int,
     limits: FlightLimits,
     around: Surroundings,
 ) -> Array:
     """`way_around`, compiled."""
     low = np.maximum(np.minimum(start_m, goal_m) - room_m, around.room_m[0])
     high = np.minimum(np.maximum(start_m, goal_m) + room_m, around.room_m[1])
-    volume = 1.0
-    for axis in range(3):
+    ends, off = ends_of(start_m, goal_m, around, limits), goal_m - start_m
+    level2, beside, beside_s = off[0] * off[0] + off[1] * off[1], np.empty((0, 3)), np.inf
+    if abs(off[2]) <= STEEPEST_SHEET * limits.climb_tangent * np.sqrt(level2):
+        tilt = off[:2] * (off[2] / max(level2, 1e-9))
+        low_up = start_m[2] + tilt[0] * (low[0] - start_m[0]) + tilt[1] * (low[1] - start_m[1])
+        sheet_low = np.array([low[0], low[1], low_up])
+        sheet_high = np.array([high[0], high[1], low_up])
+        sheet = lattice_between(sheet_low, sheet_high, start_m, goal_m, cell_m, tilt)
+        beside, beside_s = astar(sheet, margin * sheet.cell_m, start_m, goal_m, MAX_CELLS, np.inf, limits, around, ends)
+        straight_s = span(off[0], off[1], off[2]) / limits.cruise_m_s
+        if beside_s <= BESIDE_IS_WELL * straight_s:
+            return straighten(beside, sheet.cell_m, limits, around, ends)
+    if flat and len(beside) == 0:
+        return beside
+    space = lattice_between(low, high, start_m, goal_m, cell_m, np.zeros(2))
+    path, path_s = astar(space, margin * space.cell_m, start_m, goal_m, most_cells, beside_s, limits, around, ends)
+    if not path_s < beside_s:
+        path = beside
+    return straighten(path, space.cell_m, limits, around, ends) if len(path) > 0 else path
+
+
+@compiled
+def lattice_between(low: Array, high: Array, start_m: Array, goal_m: Array, cell_m: float, tilt: Array) -> Lattice:
+    """A lattice that fills a box from `low` to `high`, (3,) each; its cells are larger where they would be too many."""
+    volume, axes = 1.0, 3 if high[2] > low[2] else 2
+    for axis in range(axes):
         volume *= max(high[axis] - low[axis], cell_m)
-    cell_m = max(cell_m, (volume / MAX_CELLS) ** (1.0 / 3.0))
-    shape, first, last = np.empty(3, np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
-    for axis in range(3):
+    cell_m = max(cell_m, (volume / MAX_CELLS) ** (1.0 / axes))
+    shape, first, last = np.ones(3, np.int64), np.zeros(3, np.int64), np.zeros(3, np.int64)
+    for axis in range(axes):
         shape[axis] = max(int(np.floor((high[axis] - low[axis]) / cell_m)), 0) + 1
         first[axis] = min(max(int(np.rint((start_m[axis] - low[axis]) / cell_m)), 0), shape[axis] - 1)
         last[axis] = min(max(int(np.rint((goal_m[axis] - low[axis]) / cell_m)), 0), shape[axis] - 1)
-    ends = ends_of(start_m, goal_m, around, limits)
-    cells = astar(low, shape, cell_m, margin * cell_m, first, last, limits, around, ends)
-    if len(cells) == 0:
-        return np.empty((0, 3))
-    path = np.empty((max(len(cells), 2), 3))
-    for i in range(1, len(cells) - 1):
-        path[i, 0] = low[0] + cell_m * (cells[i] // (shape[1] * shape[2]))
-        path[i, 1] = low[1] + cell_m * (cells[i] // shape[2] % shape[1])
-        path[i, 2] = low[2] + cell_m * (cells[i] % shape[2])
-    path[0], path[len(path) - 1] = start_m, goal_m
-    return straighten(path, cell_m, limits, around, ends)
+    return Lattice(low, cell_m, shape, tilt, first, last)
 
 
 @compiled
 def astar(
-    low: Array,
-    shape: npt.NDArray[np.int64],
-    cell_m: float,
+    lattice: Lattice,
     margin_m: float,
-    first: npt.NDArray[np.int64],
-    last: npt.NDArray[np.int64],
+    start_m: Array,
+    goal_m: Array,
+    most_cells: int,
+    most_s: float,
     limits: FlightLimits,
     around: Surroundings,
     ends: Array,
-) -> npt.NDArray[np.int64]:
-    """(m,) cells of the quickest way between two, both included; (0,) when there is none.
+) -> tuple[Array, float]:
+    """(m, 3) places of the quickest way between two, both included, and its time [s]; (0, 3) when there is none.
 
     Args:
-        low: (3,) place of the first cell, ENU [m].
-        shape: (3,) number of cells.
-        cell_m: size of a cell.
+        lattice: the cells.
         margin_m: cells need so much more clearance, but for those around the first and the last one.
-        first: (3,) where the way begins; it may be blocked itself.
-        last: (3,) where it ends; likewise.
+        start_m, goal_m: (3,) both ends, ENU.
+        most_cells: it is given up when the search has gone on from so many.
+        most_s: only quicker ways are of interest.
         limits, around, ends: see `lacking`.
     """
+    shape, cell_m, first, last = lattice.shape, lattice.cell_m, lattice.first, lattice.last
     n_north, n_up = shape[1], shape[2]
     begin, end = (first[0] * n_north + first[1]) * n_up + first[2], (last[0] * n_north + last[1]) * n_up + last[2]
-    n = shape[0] * n_north * n_up
+    n, gone_on = shape[0] * n_north * n_up, 0
     speeds, cost, parents = np.full(n, UNSEEN), np.full(n, np.inf), np.full(n, -1, np.int64)
     probe, climb_sine, fast_m_s = new_probe(), sine_of(limits), limits.cruise_m_s
     cost[begin] = 0.0
     queue: list[tuple[float, int]] = [(0.0, int(begin))]
-    while len(queue) > 0:
+    while len(queue) > 0 and gone_on < most_cells:
         estimate, cell = heapq.heappop(queue)
         east, north, up = cell // (n_north * n_up), cell // n_up % n_north, cell % n_up
         ahead = GREED * steps_between(last[0] - east, last[1] - north, last[2] - up) * cell_m / fast_m_s
@@ -133,6 +177,7 @@ def astar(
             break
         if estimate > cost[cell] + ahead + 1e-9:
             continue  # an older entry of the queue: a quicker way was found since
+        gone_on += 1
         for step in range(27):
             de, dn, du = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
             e, n_, u = east + de, north + dn, up + du
@@ -140,8 +185,7 @@ def astar(
                 continue
             other = (e * n_north + n_) * n_up + u
             if speeds[other] == UNSEEN:
-                probe.place_m[0, 0], probe.place_m[0, 1] = low[0] + cell_m * e, low[1] + cell_m * n_
-                probe.place_m[0, 2] = low[2] + cell_m * u
+                put(lattice, e, n_, u, probe.place_m[0])
                 off = min(span(e - first[0], n_ - first[1], u - first[2]), span(e - last[0], n_ - last[1], u - last[2]))
                 speeds[other] = speed_at(probe, margin_m * min(off / FADED_CELLS, 1.0), limits, around, ends)
             if speeds[other] == BLOCKED and other != end:
@@ -149,10 +193,19 @@ def astar(
             length_m = climbed(span(de, dn, du), du, climb_sine) * cell_m
             reached = cost[cell] + length_m / max(speeds[other], NEAR_SHARE * limits.avoidance_m_s)
             if reached < cost[other]:
-                cost[other], parents[other] = reached, cell
-                left = GREED * steps_between(last[0] - e, last[1] - n_, last[2] - u) * cell_m / fast_m_s
-                heapq.heappush(queue, (float(reached + left), int(other)))
-    return _trace(parents, begin, end)
+                left = steps_between(last[0] - e, last[1] - n_, last[2] - u) * cell_m / fast_m_s
+                if reached + left < most_s:
+                    cost[other], parents[other] = reached, cell
+                    heapq.heappush(queue, (float(reached + GREED * left), int(other)))
+    return _trace(parents, begin, end, lattice, start_m, goal_m), cost[end]
+
+
+@compiled
+def put(lattice: Lattice, east: int, north: int, up: int, place_m: Array) -> None:
+    """Write where a cell is into (3,)."""
+    cell_m, tilt = lattice.cell_m, lattice.tilt
+    place_m[0], place_m[1] = lattice.low_m[0] + cell_m * east, lattice.low_m[1] + cell_m * north
+    place_m[2] = lattice.low_m[2] + cell_m * (up + tilt[0] * east + tilt[1] * north)
 
 
 @compiled
@@ -199,18 +252,21 @@ def speed_at(probe: Probe, margin_m: float, limits: FlightLimits, around: Surrou
 
 
 @compiled
-def _trace(parents: npt.NDArray[np.int64], begin: int, end: int) -> npt.NDArray[np.int64]:
+def _trace(
+    parents: npt.NDArray[np.int64], begin: int, end: int, lattice: Lattice, start_m: Array, goal_m: Array
+) -> Array:
     count, cell = 1, end
     while cell != begin:
         cell = parents[cell]
         if cell < 0:
-            return np.empty(0, np.int64)
+            return np.empty((0, 3))
         count += 1
-    cells, cell = np.empty(count, np.int64), end
+    path, cell, n_north, n_up = np.empty((max(count, 2), 3)), end, lattice.shape[1], lattice.shape[2]
     for i in range(count - 1, -1, -1):
-        cells[i] = cell
+        put(lattice, cell // (n_north * n_up), cell // n_up % n_north, cell % n_up, path[i])
         cell = parents[cell]
-    return cells
+    path[0], path[len(path) - 1] = start_m, goal_m
+    return path
 
 
 @compiled

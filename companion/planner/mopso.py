@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from companion.planner.archive import Archive, Offer, best_ranked, leader, new_archive, offer
 from companion.planner.dominance import dominates, is_feasible, is_preferred, weighted_sum
-from companion.planner.evaluation import LocalProblem, evaluate
+from companion.planner.evaluation import HARD, LocalProblem, evaluate
 from companion.planner.tabu import TabuMemory, go_to, new_memory, tabu_step
 from companion.settings import SearchSettings
 from missions.kernels import compiled
@@ -29,6 +29,8 @@ REACH = 3.0
 """Shifts are kept within so many spreads of the reference."""
 STALLED_M = 2e-3
 """A generation that betters the weighted sum by less than this has not found anything."""
+HOPEFUL = 0.95
+"""Nor has one, while limits are broken, that leaves more than this share of the violations."""
 FIRST_STEP, LAST_STEP = 0.5, 0.02
 """Steps of the tabu search, as shares of the spread."""
 
@@ -124,7 +126,7 @@ def search(problem: LocalProblem, swarm: Swarm, spread: Array, plan: SearchPlan,
         progress = iteration / max(plan.iterations, 1)
         if iteration > 0:
             follow_leader(swarm, lead, dominant_streak, barren_streak, plan, rng)
-        gained, best_before = False, weighted_sum(swarm.best_value, plan.weights)
+        gained, best_before = False, swarm.best_value.copy()
         for i in range(len(swarm.x)):
             if iteration > 0:
                 fly(swarm, i, lead, progress, spread, rng)
@@ -143,10 +145,18 @@ def search(problem: LocalProblem, swarm: Swarm, spread: Array, plan: SearchPlan,
                 gained |= record(swarm, swarm.neighbours[i], swarm.neighbour_values[i], plan)
         dominant_streak = dominant_streak + 1 if gained else 0
         barren_streak = 0 if gained else barren_streak + 1
-        better_m = best_before - weighted_sum(swarm.best_value, plan.weights)
-        stalled = 0 if better_m > STALLED_M or not is_feasible(swarm.best_value) else stalled + 1
+        stalled = 0 if is_onto_something(swarm.best_value, best_before, plan.weights) else stalled + 1
         if stalled >= plan.stall:
             break
+
+
+@compiled
+def is_onto_something(best: Array, before: Array, weights: Array) -> bool:
+    """A generation has bettered the best (5,) value enough for another one to be worth its time."""
+    if is_feasible(best):
+        gain_m = weighted_sum(before, weights) - weighted_sum(best, weights)
+        return gain_m > STALLED_M or not is_feasible(before)
+    return best[HARD] == 0.0 or best[HARD] < HOPEFUL * before[HARD]
 
 
 @compiled

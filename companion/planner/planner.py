@@ -10,9 +10,10 @@ from companion.fleet.neighbour import Neighbour
 from companion.mapping.local_map import LocalMap, View
 from companion.mapping.sorting import Known
 from companion.planner.braking import brake_along
+from companion.planner.detours import lead_around
 from companion.planner.dominance import objective_weights
 from companion.planner.evaluation import HARD
-from companion.planner.guide import MERGED_M, Guide, lay_guide, lead_around, run_out
+from companion.planner.guide import MERGED_M, Guide, lay_guide, run_out
 from companion.planner.limits import Surroundings, flight_limits, free_space, surroundings
 from companion.planner.local_plan import Horizon, LocalPlanner, plan_along, warm_way
 from companion.planner.mopso import search_plan
@@ -108,7 +109,7 @@ class Planner:
         horizon_m, phi = mission.onboard.horizon_m, mission.planner
         self.limits = flight_limits(mission, reserve)
         self.around = surroundings(mission, obstacles.pack(mission.world.as_known()), zones_m)
-        self._local = LocalPlanner(
+        self.local = LocalPlanner(
             self.limits,
             Horizon(horizon_m, LONGEST_DURATION * horizon_m / mission.limits.cruise_speed_m_s),
             spline_shape(search.control_points),
@@ -131,7 +132,7 @@ class Planner:
 
     @property
     def horizon_m(self) -> float:
-        return self._local.horizon.length_m
+        return self.local.horizon.length_m
 
     def lay_guide(self, track: Track, index: int, from_m: Array) -> Guide:
         """The guide from a place along the rest of a track, not yet led around anything."""
@@ -203,7 +204,7 @@ class Planner:
 
     def _around(self, place_m: Array, begin_s: float, neighbours: tuple[Neighbour, ...]) -> Surroundings:
         """Everything around a vehicle that is at a place at a time."""
-        view, longest_s = self._map.view, SLOWEST_SCALE * self._local.horizon.duration_s
+        view, longest_s = self._map.view, SLOWEST_SCALE * self.local.horizon.duration_s
         moving = traffic(view.movers, neighbours, self._mission_limits, begin_s, longest_s, place_m)
         return self.around._replace(field=view.field, moving=moving)
 
@@ -213,10 +214,9 @@ class Planner:
 
     def _led(self, request: PlanRequest, around: Surroundings, *, strictly: bool) -> tuple[Guide, float]:
         """The request's guide led around what blocks it, or itself if there is no way; and how much of it is done."""
-        place_m, limits = np.asarray(request.start.position_m), self.limits
-        guide = lead_around(
-            request.guide, around, limits, self.horizon_m, self.cell_m, request.arc_m, place_m, strictly=strictly
-        )
+        place_m, arc_m, quick = np.asarray(request.start.position_m), request.arc_m, request.committed is not None
+        size = (self.horizon_m, self.cell_m)
+        guide = lead_around(request.guide, around, self.limits, *size, arc_m, place_m, strictly=strictly, quick=quick)
         if guide is None or guide is request.guide:  # without a way around, as far as it goes
             return request.guide, request.arc_m
         begun_anew = np.linalg.norm(guide.way.points_m[0] - place_m) < MERGED_M
@@ -226,7 +226,7 @@ class Planner:
     def _plan_along(self, request: PlanRequest, guide: Guide, arc_m: float, around: Surroundings) -> Plan:
         start = np.ascontiguousarray(request.start, dtype=float)
         warm = self._warm_way(request.committed, request.start_s, guide, arc_m)
-        plan = plan_along(guide.way, arc_m, start, warm, self._local, around, self._rng)
+        plan = plan_along(guide.way, arc_m, start, warm, self.local, around, self._rng)
         trajectory = Trajectory(plan.control_m, request.start_s, plan.knot_s)
         if plan.value[HARD] > 0.0 or not self.is_clear(trajectory, request.start_s, request.neighbours):
             return Plan(request, None, guide, arc_m)

@@ -1,7 +1,7 @@
 """One vehicle that tracks ideally: the companion's planner and flight logic, a simulated sensor, no autopilot."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,8 @@ class MeasuredPlanner(Planner):
         self.map_ms: list[float] = []
         self.tick_ms: list[float] = []
         """Per scan: the check of the committed trajectory, and the plans that were made until the next one."""
+        self.witness: Callable[[PlanRequest, Plan, float], None] = lambda *_: None
+        """Is told of every replan and its CPU time [ms]."""
 
     def plan(self, request: PlanRequest) -> Plan:
         began_s = time.thread_time()
@@ -47,6 +49,7 @@ class MeasuredPlanner(Planner):
         self.plan_ms.append((time.thread_time() - began_s) * 1e3)
         if self.tick_ms:
             self.tick_ms[-1] += self.plan_ms[-1]
+        self.witness(request, plan, self.plan_ms[-1])
         return plan
 
     def observe(self, scan: Scan, neighbours: tuple[Neighbour, ...] = ()) -> None:

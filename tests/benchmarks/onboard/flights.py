@@ -59,7 +59,11 @@ class Score:
 
 def fly(course: Course, search: SearchSettings | None = None, reserve: Reserve | None = None) -> list[Score]:
     """Let all vehicles of a course fly, each for itself; nobody tells anybody anything."""
-    crafts = [Craft(course, index, course.seed, search, reserve) for index in range(len(course.starts_m))]
+    return cross(course, [Craft(course, i, course.seed, search, reserve) for i in range(len(course.starts_m))])
+
+
+def cross(course: Course, crafts: list[Craft]) -> list[Score]:
+    """Let crafts fly the course for which they were made."""
     eyes = Eyes(course)
     flown = Flown(course)
     for step in range(int(TIME_LIMIT_S / TICK_S)):

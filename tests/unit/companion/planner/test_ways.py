@@ -1,17 +1,19 @@
 """Guides, references, ways around, and the spline's constants."""
 
+import msgspec
 import numpy as np
 import pytest
 
+from companion.planner.detours import blocked_samples, lead_around
 from companion.planner.grid_search import way_around
-from companion.planner.guide import blocked_samples, corner_speeds, lay_guide, lead_around, nearest_on, run_out
+from companion.planner.guide import corner_speeds, lay_guide, nearest_on, run_out
 from companion.planner.reference import LEG_SPEED, SPEED_CAP, TANGENT, Way, corner_speed, lay_reference, reach_speeds
 from companion.planner.spline_shape import sample_rows, spline_shape
 from missions import bspline, obstacles
 from missions.mission_items import Track
 from missions.time_law import arc_length, resample, speeds_along
 from missions.trajectory import Motion, Trajectory
-from missions.world import World
+from missions.world import Box, World
 from tests.unit.companion.planner.problems import (
     AROUND_THE_CRATE_M,
     INDOOR,
@@ -165,6 +167,51 @@ def test_out_of_a_closed_room_there_is_no_way():
     walled_in = LIMITS._replace(clearance_m=20.0)
     start_m, goal_m = np.array([7.0, 3.0, 1.5]), np.array([7.0, 12.0, 1.5])
     assert way_around(start_m, goal_m, 4.0, 0.2, walled_in, AROUND).shape == (0, 3)
+
+
+def with_boxes(*boxes: Box):
+    """The room with nothing but some boxes in it."""
+    world = msgspec.structs.replace(INDOOR.world, boxes=boxes, cylinders=())
+    return AROUND._replace(obstacles=obstacles.pack(world))
+
+
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_low_wall_from_side_to_side_is_flown_over(quick: bool):
+    around = with_boxes(Box(name="wall", centre_m=(10.0, 7.5, 1.0), half_m=(0.2, 7.5, 1.0)))
+    start_m, goal_m = np.array([7.0, 7.0, 1.5]), np.array([13.0, 7.0, 1.5])
+    assert way_around(start_m, goal_m, 4.0, 0.2, LIMITS, around, flat=True, quick=quick).shape == (0, 3)
+    corners = way_around(start_m, goal_m, 4.0, 0.2, LIMITS, around, quick=quick)
+    assert corners[:, 2].max() >= 2.0 + LIMITS.clearance_m
+    assert obstacles.clearance(along(corners), around.obstacles).min() >= LIMITS.clearance_m
+
+
+def test_over_is_flown_where_beside_takes_much_longer():
+    around = with_boxes(Box(name="wall", centre_m=(10.0, 4.0, 0.5), half_m=(0.2, 4.0, 1.0)))
+    start_m, goal_m = np.array([8.0, 2.0, 1.5]), np.array([12.0, 2.0, 1.5])
+    corners = way_around(start_m, goal_m, 8.0, 0.2, LIMITS, around, flat=True)
+    assert corners[:, 1].max() < 6.0
+    assert corners[:, 2].max() >= 1.5 + LIMITS.clearance_m
+
+
+def test_a_level_way_keeps_to_the_line_from_start_to_goal_in_height():
+    around = with_boxes(Box(name="post", centre_m=(10.0, 7.0, 2.0), half_m=(0.5, 0.5, 2.0)))
+    start_m, goal_m = np.array([6.0, 7.0, 1.0]), np.array([14.0, 7.0, 2.0])
+    places_m = along(way_around(start_m, goal_m, 4.0, 0.2, LIMITS, around))
+    np.testing.assert_allclose(places_m[:, 2], 1.0 + (places_m[:, 0] - 6.0) / 8.0, atol=0.05)
+
+
+def test_a_guide_whose_next_places_are_walled_in_is_led_to_the_track_point():
+    walls = [(9.0, 7.0, 0.2, 3.0), (17.0, 7.0, 0.2, 3.0), (13.0, 4.2, 4.0, 0.2), (13.0, 9.8, 4.0, 0.2)]
+    boxes = [
+        Box(name=f"wall {i}", centre_m=(east, north, 2.0), half_m=(half_east, half_north, 2.0))
+        for i, (east, north, half_east, half_north) in enumerate(walls)
+    ]
+    around, track = with_boxes(*boxes), Track(np.array([[19.0, 7.0, 1.5]]), np.array([3.0]))
+    guide = guide_from([2.0, 7.0, 1.5], track=track)
+    led = lead_around(guide, around, LIMITS, 5.0, 0.2, quick=True)
+    assert led is not None
+    assert obstacles.clearance(led.way.points_m, around.obstacles).min() >= LIMITS.clearance_m
+    np.testing.assert_allclose(led.end_m, [19.0, 7.0, 1.5])
 
 
 def test_large_worlds_are_searched_with_larger_cells():
