@@ -16,6 +16,10 @@ Array = npt.NDArray[np.float64]
 WIDER_AROUND_OBSTACLES = 3.0
 """Where the guide itself is only a rough way around something, the corridor is so many times as wide."""
 MAX_DETOURS = 20
+FIRST_WHERE_IT_IS_WIDE = ((True, False), (True, True), (False, False), (False, True))
+"""In which order ways are looked for: beside things alone, through narrow places."""
+WIDER_BOX = 3.0
+"""Ways through narrow places are looked for so many times as far around."""
 
 
 def lead_around(
@@ -187,14 +191,12 @@ def _ways(
 
     Who is in flight has time to look for one way over things, to the first of the samples.
     """
-    for flat in (True, False):
+    for flat, narrow in FIRST_WHERE_IT_IS_WIDE[: 3 if quick else 4]:
         for b in rejoin if flat or not quick else rejoin[:1]:
             end_m = guide.way.points_m[b].copy()
             room_m = max(0.3 * float(np.linalg.norm(end_m - begin_m)), 4.0 * _pull_m(limits))
-            if flat or not quick:
-                yield b, way_around(begin_m, end_m, room_m, cell_m, limits, around, flat=flat, quick=quick)
-            wide_m = 3.0 * room_m if flat or not quick else room_m
-            yield b, way_around(begin_m, end_m, wide_m, cell_m, limits, around, narrow=True, flat=flat, quick=quick)
+            room_m *= WIDER_BOX if narrow else 1.0
+            yield b, way_around(begin_m, end_m, room_m, cell_m, limits, around, narrow=narrow, flat=flat, quick=quick)
 
 
 def _detour(

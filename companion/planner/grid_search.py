@@ -17,8 +17,10 @@ from missions.kernels import compiled
 Array = npt.NDArray[np.float64]
 
 MAX_CELLS = 60_000
-QUICK_CELLS = 4_000
-"""A quick search in space gives up when it has gone on from so many cells: a few milliseconds."""
+QUICK_CELLS = 6_000
+"""A quick search gives up when it has gone on from so many cells: a few milliseconds."""
+NARROW_CELL = 0.5
+"""Size of the cells for narrow places, as a share of the usual one."""
 BESIDE_IS_WELL = 1.5
 """A way on the sheet that takes at most this multiple of the straight line's time is not compared with any other."""
 STEEPEST_SHEET = 0.5
@@ -60,7 +62,7 @@ def way_around(
         cell_m: least size of a cell; larger ones are taken where there would be too many.
         limits: clearance and speeds.
         around: what is in the way, and the flight range.
-        narrow: go where cells have no more clearance than what is required.
+        narrow: take smaller cells, which need a smaller margin and fit through narrower places.
         flat: go over or under things only where going beside them is possible, but takes longer.
         quick: give up early, as who is in flight has to.
 
@@ -68,8 +70,8 @@ def way_around(
         (m, 3) corners from start to goal; (0, 3) when there is no way.
     """
     start_m, goal_m = np.asarray(start_m, dtype=float), np.asarray(goal_m, dtype=float)
-    margin, most_cells = 0.0 if narrow else CELL_MARGIN, QUICK_CELLS if quick else MAX_CELLS
-    return find_way(start_m, goal_m, room_m, cell_m, margin, flat, most_cells, limits, around)
+    cell_m, most_cells = NARROW_CELL * cell_m if narrow else cell_m, QUICK_CELLS if quick else MAX_CELLS
+    return find_way(start_m, goal_m, room_m, cell_m, CELL_MARGIN, flat, most_cells, limits, around)
 
 
 class Lattice(NamedTuple):
@@ -111,7 +113,9 @@ def find_way(
         sheet_low = np.array([low[0], low[1], low_up])
         sheet_high = np.array([high[0], high[1], low_up])
         sheet = lattice_between(sheet_low, sheet_high, start_m, goal_m, cell_m, tilt)
-        beside, beside_s = astar(sheet, margin * sheet.cell_m, start_m, goal_m, MAX_CELLS, np.inf, limits, around, ends)
+        beside, beside_s = astar(
+            sheet, margin * sheet.cell_m, start_m, goal_m, most_cells, np.inf, limits, around, ends
+        )
         straight_s = span(off[0], off[1], off[2]) / limits.cruise_m_s
         if beside_s <= BESIDE_IS_WELL * straight_s:
             return straighten(beside, sheet.cell_m, limits, around, ends)

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.planner.evaluation import HARD, LocalProblem, evaluate
-from companion.planner.limits import FlightLimits, Surroundings, ends_of, free_at
+from companion.planner.limits import FlightLimits, Surroundings, ends_of, free_at, span
 from companion.planner.mopso import SearchPlan, chosen, new_swarm, search
-from companion.planner.reference import LEG_SPEED, WIDTH, Reference, Way, apart, lay_reference
+from companion.planner.reference import LEG_SPEED, STANDING_M_S, WIDTH, Reference, Way, apart, lay_reference
 from companion.planner.spline_shape import SplineShape
 from companion.planner.traffic import spline_point
 from missions.kernels import compiled
@@ -16,7 +16,9 @@ from missions.kernels import compiled
 Array = npt.NDArray[np.float64]
 
 LADDER = (1.0, 0.6, 1.0 / 3.0)
-"""Shares of the horizon that are tried one after the other."""
+"""Shares of the horizon that are tried one after the other ..."""
+CREEPING = 1.0 / 6.0
+"""... and the last one of a vehicle that stands: out of a narrow place."""
 TIME_SCALES = (0.0, np.log(1.06), np.log(1.15), np.log(1.35))
 """Logarithms of the time scales of the first particles."""
 TIME_SPREAD = 0.05
@@ -78,6 +80,8 @@ def plan_along(
     for share in LADDER[1:]:
         if plan.value[HARD] > 0.0:
             plan = plan_within(share, way, from_m, start, warm, planner, around, rng)
+    if plan.value[HARD] > 0.0 and span(start[1, 0], start[1, 1], start[1, 2]) < STANDING_M_S:
+        plan = plan_within(CREEPING, way, from_m, start, warm, planner, around, rng)
     return plan
 
 
@@ -114,7 +118,7 @@ def reference_within(
 ) -> tuple[float, Reference]:
     """Where the plan ends on the way, and its reference: both are kept within a share of the horizon."""
     limits, n_samples = planner.limits, planner.shape.fit_path.shape[1]
-    reach_m, shortest_m = share * planner.horizon.length_m, LADDER[2] * planner.horizon.length_m
+    reach_m, shortest_m = share * planner.horizon.length_m, min(share, LADDER[2]) * planner.horizon.length_m
     to_m = resting_place(way, from_m, reach_m, limits, around)
     reference = lay_reference(way, from_m, to_m, start, n_samples, limits, around)
     longest_s = share * planner.horizon.duration_s

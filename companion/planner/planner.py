@@ -128,6 +128,8 @@ class Planner:
             mission.limits.body_radius_m,
         )
         self.voxel_m = mission.onboard.voxel_m
+        self._strictly = False
+        """The next guide is led around narrow places as well."""
         self.cell_m = CELLS_PER_VOXEL * self.voxel_m
 
     @property
@@ -167,15 +169,17 @@ class Planner:
     def plan(self, request: PlanRequest) -> Plan:
         """Plan along the request's guide, which is first led around what blocks it.
 
-        Where no plan squeezes past a narrow place that way, it is led around narrow places as well.
+        Where no plan squeezes past a narrow place that way, it is led around narrow places as well: at once if nothing
+        else had to be led around, which would take too long twice, and with the next request otherwise.
         """
         around = self._around(request.start.position_m, request.start_s, request.neighbours)
-        guide, arc_m = self._led(request, around, strictly=False)
+        guide, arc_m = self._led(request, around, strictly=self._strictly)
         plan = self._plan_along(request, guide, arc_m, around)
-        if plan.trajectory is not None:
+        if plan.trajectory is not None or guide is not request.guide:
+            self._strictly = plan.trajectory is None and not self._strictly
             return plan
-        other, arc_m = self._led(request, around, strictly=True)
-        return plan if other is guide or other is request.guide else self._plan_along(request, other, arc_m, around)
+        other, arc_m = self._led(request, around, strictly=not self._strictly)
+        return plan if other is request.guide else self._plan_along(request, other, arc_m, around)
 
     def is_clear(self, trajectory: Trajectory, now_s: float, neighbours: tuple[Neighbour, ...] = ()) -> bool:
         """The rest of a trajectory has no conflict."""

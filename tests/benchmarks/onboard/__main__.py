@@ -12,6 +12,7 @@ from tests.benchmarks.command_line import machine, seed_range
 from tests.benchmarks.onboard.ablation import ablation
 from tests.benchmarks.onboard.closed_loop import closed_loop
 from tests.benchmarks.onboard.flights import fly
+from tests.benchmarks.onboard.processes import processes
 from tests.benchmarks.onboard.single import Part, single_vehicles
 from tests.benchmarks.onboard.worlds import COURSES
 from tests.benchmarks.planner.figures import Results
@@ -28,11 +29,12 @@ STANDING = ["room", "forest50", "forest100", "forest200"]
 PARTS: dict[str, tuple[Callable[[range, list[str]], Iterator[Part]], list[str]]] = {
     "single": (single_vehicles, list(COURSES)),
     "closed-loop": (closed_loop, STANDING),
+    "processes": (processes, []),
     "ablation": (ablation, ["room", "forest100"]),
     "peers": (compared, ["room", "forest100", "forest200"]),
 }
 """By name; and the worlds that each flies through unless it is told others."""
-REQUIRED = ["single", "closed-loop"]
+REQUIRED = ["single", "closed-loop", "processes"]
 QUICK_SEEDS = 2
 WARM_UP_SEED = 10_000
 

@@ -124,6 +124,18 @@ def objectives(*three: float, hard: float = 0.0) -> np.ndarray:
     return np.array([*three, hard, 0.0])
 
 
+def test_a_search_goes_on_while_it_betters_its_best_and_ends_where_there_is_no_hope():
+    unknown = np.full(5, np.inf)
+    assert mopso.is_onto_something(objectives(9.0, 0.0, 0.0, hard=2.0), unknown, WEIGHTS)
+    assert mopso.is_onto_something(objectives(9.0, 0.0, 0.0, hard=1.8), objectives(1.0, 0.0, 0.0, hard=2.0), WEIGHTS)
+    assert not mopso.is_onto_something(
+        objectives(1.0, 0.0, 0.0, hard=1.99), objectives(9.0, 0.0, 0.0, hard=2.0), WEIGHTS
+    )
+    assert mopso.is_onto_something(objectives(9.0, 0.0, 0.0), objectives(1.0, 0.0, 0.0, hard=0.1), WEIGHTS)
+    assert mopso.is_onto_something(objectives(8.9, 0.0, 0.0), objectives(9.0, 0.0, 0.0), WEIGHTS)
+    assert not mopso.is_onto_something(objectives(9.0, 0.0, 0.0), objectives(9.0, 0.0, 0.0), WEIGHTS)
+
+
 def test_the_personal_best_rule():
     """The dominating one stays or comes; a coin decides when neither dominates; constraints come first."""
     rng = np.random.default_rng(0)
