@@ -69,10 +69,11 @@ class Scenario:
     @property
     def story(self) -> str:
         """What goes wrong, in one line."""
-        links = {kind: getattr(self.truth.simulation, f"{kind}_link") for kind in ("ground", "onboard", "fleet")}
+        simulated = self.truth.simulation
+        links = {"ground": simulated.ground_link, "onboard-link": simulated.onboard_link, "fleet": simulated.fleet_link}
         disturbed = [f"{kind} {_named(link)}" for kind, link in links.items() if link != LinkSettings()]
         unmapped = [thing.name for thing in self.truth.world.cylinders if not thing.known]
-        fleet = [f"fleet of {len(self.mission.vehicles)}"] if len(self.mission.vehicles) > 2 else []
+        fleet = [f"fleet-of {len(self.mission.vehicles)}"] if len(self.mission.vehicles) > 2 else []
         told = [_named(trouble) for trouble in (*self.faults, *self.mishaps)]
         return "; ".join([self.mode.value, *fleet, *disturbed, *unmapped, *told])
 
