@@ -6,7 +6,7 @@ from gcs.dialect import Mode
 from gcs.flight.monitor import Phase
 from gcs.flight.report import Flown
 from gcs.settings import PlanningMode
-from missions.faults import CompanionKill
+from missions.faults import CompanionKill, Fault
 from missions.mission import load_mission
 from tests.soak.experiment import fly, runs, work
 from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, Mishap, WallClockJump
@@ -16,10 +16,10 @@ from tests.soak.troubled_system import TroubledSystem
 INDOOR = load_mission("indoor")
 
 
-def flown(*mishaps: Mishap, mode: PlanningMode = PlanningMode.CLOUD, **system) -> TroubledSystem:
-    troubled = TroubledSystem(INDOOR, mode, seed=1, mishaps=mishaps, **system)
-    troubled.report = troubled.fly()  # type: ignore[attr-defined]
-    return troubled
+def flown(*mishaps: Mishap, mode: PlanningMode = PlanningMode.CLOUD, faults: tuple[Fault, ...] = ()) -> TroubledSystem:
+    system = TroubledSystem(INDOOR, mode, seed=1, mishaps=mishaps, faults=faults)
+    system.fly()
+    return system
 
 
 def flown_by(system: TroubledSystem, sysid: int) -> Flown:

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,6 +14,7 @@ from gcs.flight.monitor import Phase
 from gcs.flight.rejoining import rejoin, told_flight, unfinished
 from gcs.flight.report import FlightReport, make_report
 from gcs.flight.sequence import FleetFlight
+from gcs.link.connection import Address, Connection
 from gcs.station import Station
 from missions.mission import Vehicle
 from sitl.simulator import UTC_START_US
@@ -45,19 +46,18 @@ class GroundProcess:
     """What of the ground station ends with its process: the station, its wire, and what waits in its socket."""
 
     def __init__(self, system: "TroubledSystem") -> None:
-        self.station = DeafStation(self, unix_us=system.wall_clock_us)
+        self.station = DeafStation(self, system.wall_clock_us)
         self.wire = HaltedWire(self, system)
         self.station.connections.append(self.wire)
         self.halted = self.ended = False
-        self.waiting_in: deque[bytes] = deque(maxlen=MOST_WAITING)
-        self.waiting_addresses: deque[tuple[str, int]] = deque(maxlen=MOST_WAITING)
-        self.waiting_out: list[tuple[bytes, tuple[str, int]]] = []
+        self.waiting_in: deque[tuple[bytes, Address]] = deque(maxlen=MOST_WAITING)
+        self.waiting_out: list[tuple[bytes, Address]] = []
 
     def go_on(self) -> None:
         """End a hang: what has waited comes and goes at once."""
         self.halted = False
         while self.waiting_in:
-            self.station.receive(self.wire, self.waiting_in.popleft(), self.waiting_addresses.popleft())
+            self.station.receive(self.wire, *self.waiting_in.popleft())
         for datagram, address in self.waiting_out:
             self.wire.send(datagram, address)
         self.waiting_out = []
@@ -66,16 +66,15 @@ class GroundProcess:
 class DeafStation(Station):
     """A station that takes in nothing while its process hangs, and never again when that has ended."""
 
-    def __init__(self, process: GroundProcess, **kept) -> None:
-        super().__init__(**kept)
+    def __init__(self, process: GroundProcess, unix_us: Callable[[], int]) -> None:
+        super().__init__(unix_us=unix_us)
         self._process = process
 
-    def receive(self, connection, datagram: bytes, address) -> None:
+    def receive(self, connection: Connection, datagram: bytes, address: Address) -> None:
         if self._process.ended:
             return
         if self._process.halted:
-            self._process.waiting_in.append(datagram)
-            self._process.waiting_addresses.append(address)
+            self._process.waiting_in.append((datagram, address))
             return
         super().receive(connection, datagram, address)
 
@@ -87,7 +86,7 @@ class HaltedWire(GroundWire):
         super().__init__(system.simulator)
         self._process = process
 
-    def send(self, datagram: bytes, address: tuple[str, int]) -> None:
+    def send(self, datagram: bytes, address: Address) -> None:
         if self._process.halted:
             self._process.waiting_out.append((datagram, address))
         elif not self._process.ended:
