@@ -1,6 +1,7 @@
 """One desk's page: what stands in the scene and in the panels, and how often each is brought up to date."""
 
 import asyncio
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -18,7 +19,7 @@ from gcs.view.colours import BRAND, TARGET, Tone
 from gcs.view.editing_panel import EditingPanel
 from gcs.view.motion_scene import MotionScene
 from gcs.view.observed_scene import ObservedScene
-from gcs.view.overlay import Tag
+from gcs.view.overlay import FEW, Tag
 from gcs.view.panels import Panels, Press
 from gcs.view.plan_scene import PlanScene
 from gcs.view.replay_panel import ReplayPanel
@@ -47,6 +48,7 @@ VEHICLE_FLATNESS = 0.6
 """A quadrotor is less high than wide in a picture from above."""
 SELECTED, WARNING, ALARM = 1, 2, 3
 """How urgent a tag is."""
+LOOKS = {Tone.BAD: (ALARM, "vehicle bad"), Tone.WARN: (WARNING, "vehicle warn")}
 TRAIL_SPACING_SHARE = 1 / 2000
 POINT_SHARE = 1 / 350
 LEAST_TRAIL_SPACING_M = 0.05
@@ -127,7 +129,8 @@ class Page:
     def _tag(self, seen: Sightings, now_s: float) -> None:
         """Write the name tags anew."""
         picked, span_px = self._panels.picked_out, least_span_px(len(seen)) * VEHICLE_FLATNESS
-        vehicles = [_vehicle_tag(sighting, now_s, span_px, selected=sighting.sysid in picked) for sighting in seen]
+        brief = len(seen) > FEW
+        vehicles = [_vehicle_tag(one, now_s, span_px, selected=one.state.sysid in picked, brief=brief) for one in seen]
         self._tags = [*vehicles, *self._target_tags()]
 
     def _is_another(self, mission: Mission | None) -> bool:
@@ -267,18 +270,21 @@ class Page:
             self._cameras.follow(client, (chosen or self._seen)[0])
 
 
-def _vehicle_tag(sighting: Sighting, now_s: float, span_px: float, *, selected: bool) -> Tag:
-    """Name, mode, battery and height of a vehicle; those with something wrong stand out."""
-    state = sighting.state
+def _vehicle_tag(sighting: Sighting, now_s: float, span_px: float, *, selected: bool, brief: bool) -> Tag:
+    """Name, mode, battery and height of a vehicle; those with something wrong stand out, and if brief tell it alone."""
+    state, colour = sighting.state, sighting.colour
     mode, tone = words.mode_words(state, now_s)
-    battery = "" if np.isnan(state.battery_percent) else f"{state.battery_percent:.0f} %"
-    if not np.isnan(state.battery_percent) and words.battery_tone(state.battery_percent) is Tone.BAD:
+    if words.battery_tone(state.battery_percent) is Tone.BAD:
         tone = Tone.BAD
-    details = " · ".join(filter(None, (mode, battery, f"{words.number_words(sighting.position_m[2])} m")))
-    urgency = {Tone.BAD: ALARM, Tone.WARN: WARNING}.get(tone, SELECTED if selected else 0)
-    look = {Tone.BAD: "vehicle bad", Tone.WARN: "vehicle warn"}.get(tone, "vehicle")
-    key = f"vehicle {sighting.sysid}"
-    return Tag(key, sighting.name, details, sighting.colour, span_px, urgency, look, selected)
+    urgency, look = LOOKS.get(tone, (SELECTED if selected else 0, "vehicle"))
+    details = "" if brief and not urgency else _details(sighting, mode)
+    return Tag(f"vehicle {state.sysid}", sighting.name, details, colour, span_px, urgency, look, selected)
+
+
+def _details(sighting: Sighting, mode: str) -> str:
+    percent = sighting.state.battery_percent
+    battery = f"{percent:.0f} %" if math.isfinite(percent) else ""
+    return " · ".join(filter(None, (mode, battery, f"{words.number_words(sighting.position_m[2])} m")))
 
 
 def _draw_plain(scene: viser.SceneApi, theme: Theme) -> None:

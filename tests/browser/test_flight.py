@@ -1,14 +1,16 @@
-"""The paper's flight on the page: the real programs, a real browser, and somebody who only watches."""
+"""Flights on the page: the real programs, a real browser, and somebody who watches, from the start or from midway."""
 
+import signal
 from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, expect
 
+from gcs.desk.histories import Quantity
 from tests.browser.conftest import LARGE, tab
-from tests.browser.ground_station import gcs_fly
+from tests.browser.ground_station import gcs_fly, program
 from tests.browser.loopback import answering, free_port
-from tests.browser.watching import OUT, row, scene
+from tests.browser.watching import OUT, button, plotted, row, scene
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
 
@@ -33,6 +35,34 @@ async def test_the_indoor_mission_is_flown_before_the_operators_eyes(browser: Br
             await expect(page.locator(".gcs-overlay .tag.vehicle")).to_have_count(2)
             OUT.mkdir(exist_ok=True)
             await page.screenshot(path=OUT / "page-flown.png")
+            await page.get_by_role("tab", name="Plots").click()
+            for quantity in Quantity:
+                await expect(page.get_by_text(f"{quantity.title} [{quantity.unit}]")).to_be_visible()
+            assert min(await plotted(page)) > 100, "every plot has lines in the vehicles' colours"
+            await page.screenshot(path=OUT / "page-plots.png")
             assert process.returncode is None, "the page goes on after the flight"
     assert process.returncode is not None
     assert (tmp_path / "report.json").exists()
+
+
+async def test_a_flight_whose_ground_station_is_gone_is_watched_to_its_end(browser: Browser, tmp_path: Path):
+    """The operator presses Fly; in mid-flight that ground station is killed, and another one shows what goes on."""
+    ports, base = (free_port(), free_port()), ["--instance-base", str(INSTANCE_BASE + 10)]
+    options = ["--mode", "cloud", "--speed", "2", "--port", str(ports[0]), *base, "--report", str(tmp_path)]
+    async with program("sitl", "indoor", "--speed", "2", *base):
+        async with gcs_fly("indoor", *options) as process:
+            await answering(ports[0])
+            async with tab(browser, ports[0]) as page:
+                await expect(button(page, "Fly")).to_be_enabled()
+                await button(page, "Fly").click()
+                await expect(page.locator(".gcs-head .phase")).to_have_text("Flying", timeout=FLIGHT_TIMEOUT_MS)
+                process.send_signal(signal.SIGKILL)
+                await process.wait()
+        async with program("gcs", "watch", "--flight", str(tmp_path), "--port", str(ports[1]), *base):
+            await answering(ports[1])
+            async with tab(browser, ports[1]) as page:
+                await expect(page.locator(".gcs-head h1")).to_have_text("indoor")
+                await expect(row(page, "Mission")).to_have_count(2)
+                await expect(page.locator(".gcs-overlay .tag.vehicle").first).to_be_visible()
+                assert {"/plan/curves", "/fleet/hull", "/fleet/tails"} <= await scene(page)
+                await expect(row(page, "reached")).to_have_count(2, timeout=FLIGHT_TIMEOUT_MS)

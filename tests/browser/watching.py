@@ -87,3 +87,18 @@ async def pixels(page: Page) -> bytes:
         }"""
     )
     return bytes(values)
+
+
+async def plotted(page: Page) -> list[int]:
+    """How many coloured pixels each plot that is shown has: axes and grids are grey."""
+    return await page.evaluate(
+        """() => Array.from(document.querySelectorAll(".uplot canvas"), canvas => {
+            const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+            let coloured = 0;
+            for (let i = 0; i < data.length; i += 4) {
+                const rgb = data.slice(i, i + 3);
+                if (data[i + 3] > 128 && Math.max(...rgb) - Math.min(...rgb) > 60) coloured += 1;
+            }
+            return coloured;
+        })"""
+    )
