@@ -17,6 +17,8 @@ from missions.bspline import uniform_rows
 from missions.tunnel import CompanionState
 
 Array = npt.NDArray[np.float64]
+Segments = npt.NDArray[np.float32]
+"""As they are sent."""
 Colours = npt.NDArray[np.uint8]
 
 CHUNK = 10
@@ -63,7 +65,7 @@ class FleetTrails:
             self._read[grown] = counts[grown]
         return chunks
 
-    def segments(self, positions_m: Array) -> Array:
+    def segments(self, positions_m: Array) -> Segments:
         """(n * CHUNK, 2, 3) what is not sealed yet, up to where the vehicles (n, 3) are."""
         filled = (np.arange(CHUNK) < self._live[:, None])[..., None]
         return _joined(np.where(filled, self._tails_m, positions_m[:, None]), positions_m[:, None])
@@ -218,7 +220,7 @@ class WaysAhead:
         for count, alike in new.items():  # trajectories of as many control points at once
             self._points_m[[index for index, _ in alike]] = _basis(count) @ np.array([own for _, own in alike])
 
-    def segments(self, positions_m: Array) -> Array:
+    def segments(self, positions_m: Array) -> Segments:
         """(n * AHEAD, 2, 3) of what lies ahead of the vehicles at (n, 3) positions, from each vehicle onwards."""
         points_m = np.where(self._shown[:, None, None], self._points_m, positions_m[:, None])
         away_m = points_m - positions_m[:, None]
@@ -227,7 +229,7 @@ class WaysAhead:
         return _joined(positions_m[:, None], points_m[np.arange(len(points_m))[:, None], following])
 
 
-def _joined(first_m: Array, then_m: Array) -> Array:
+def _joined(first_m: Array, then_m: Array) -> Segments:
     """Segments (n * k, 2, 3) along n polylines of k + 1 points, each given in two parts (n, ., 3)."""
     count, steps = then_m.shape[0], first_m.shape[1] + then_m.shape[1] - 1
     segments = np.empty((count, steps, 2, 3), dtype=np.float32)
