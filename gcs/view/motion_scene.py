@@ -32,6 +32,7 @@ GroundHeight = Callable[[Array], Array]
 """(n,) height of the ground [m] below (n, 2) places."""
 
 TRAIL_PX, AHEAD_PX, STEM_PX = 2.5, 5.0, 1.0
+TRAIL_OF_MANY_PX, AHEAD_OF_MANY_PX = 1.5, 3.0
 TOLERANCE_SHARE = 0.5
 """By how much a thinned trail may be off, of its points' spacing."""
 SLOWER = 2
@@ -89,9 +90,11 @@ class MotionScene:
         self._drawn, self._past = seen.sysids, FleetTrails(len(seen), self._spacing_m)
         self._future = WaysAhead(len(seen))
         own = [vivid(colour) for colour in seen.colours]
-        self._colours = [self._theme.line_behind(colour) for colour in own]
-        self._tails = self._live("/fleet/tails", CHUNK, self._colours, TRAIL_PX)
-        self._ahead = self._live("/fleet/ahead", AHEAD, [self._theme.line_ahead(colour) for colour in own], AHEAD_PX)
+        many = len(seen) > MANY
+        self._colours = [self._theme.line_behind(colour, many=many) for colour in own]
+        self._trail_px, ahead_px = (TRAIL_OF_MANY_PX, AHEAD_OF_MANY_PX) if many else (TRAIL_PX, AHEAD_PX)
+        self._tails = self._live("/fleet/tails", CHUNK, self._colours, self._trail_px)
+        self._ahead = self._live("/fleet/ahead", AHEAD, [self._theme.line_ahead(colour) for colour in own], ahead_px)
         self._stems = self._live("/fleet/stems", 1, own, STEM_PX)
         self._batch = self._line("/trails/newest", self._lines.batch, self._lines.colours, visible=False)
 
@@ -124,7 +127,7 @@ class MotionScene:
         self, name: str, segments: Array, colours: npt.NDArray[np.uint8], *, visible: bool
     ) -> viser.LineSegmentsHandle:
         return self._scene.add_line_segments(
-            name, segments, colours, thickness=TRAIL_PX, thickness_units="screen", visible=visible
+            name, segments, colours, thickness=self._trail_px, thickness_units="screen", visible=visible
         )
 
     def _live(self, name: str, per_vehicle: int, own: Sequence[Rgb], width_px: float) -> viser.LineSegmentsHandle:

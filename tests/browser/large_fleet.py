@@ -33,5 +33,6 @@ def large_fleet() -> Mission:
             Target(name=f"t{index + 1}", position_m=(east + ACROSS_M, north, HEIGHT_M))
             for index, (east, north) in enumerate(grid)
         ),
+        limits=msgspec.structs.replace(field.limits, separation_m=1.0, clearance_m=0.5),
         allocation={f"uav-{index + 1}": f"t{(STRIDE * index) % count + 1}" for index in range(count)},
     )
