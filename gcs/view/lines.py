@@ -27,8 +27,11 @@ AHEAD = 16
 """Points of the line that shows what a companion is about to fly."""
 BATCH, MERGE, MOST_SEGMENTS = 320, 8, 2_560
 """Sealed segments go out in batches; `MERGE` batches become one line, until it has more than `MOST_SEGMENTS`."""
-MOST_OF_ALL = 40_000
-"""Segments of all lines; the oldest ones are taken away then, so that a browser can come late in any flight."""
+MOST_OF_ALL = 16_000
+"""Segments of all lines; the oldest ones are taken away then, so that a browser can come late in any flight.
+
+Each is six triangles: this many are 0.1 million, which a machine without a graphics card draws as well.
+"""
 CATCH_UP = 6
 """Of a trail that has grown by no more points than this since the last look, the newest one is enough."""
 

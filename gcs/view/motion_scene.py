@@ -33,8 +33,6 @@ GroundHeight = Callable[[Array], Array]
 
 TRAIL_PX, AHEAD_PX, STEM_PX = 2.5, 5.0, 1.0
 TRAIL_OF_MANY_PX, AHEAD_OF_MANY_PX = 1.5, 3.0
-TOLERANCE_SHARE = 0.5
-"""By how much a thinned trail may be off, of its points' spacing."""
 SLOWER = 2
 """In a large fleet, what lies ahead is sent at every second update."""
 
@@ -45,11 +43,15 @@ class MotionScene:
     Args:
         scene: of the page.
         spacing_m: between two points of a trail, at least.
+        tolerance_m: by how much a trail may be off where points are left out of it.
         ground_height_m: see `GroundHeight`.
     """
 
-    def __init__(self, scene: viser.SceneApi, spacing_m: float, ground_height_m: GroundHeight) -> None:
-        self._scene, self._spacing_m, self._ground_height_m = scene, spacing_m, ground_height_m
+    def __init__(
+        self, scene: viser.SceneApi, spacing_m: float, tolerance_m: float, ground_height_m: GroundHeight
+    ) -> None:
+        self._scene, self._ground_height_m = scene, ground_height_m
+        self._spacing_m, self._tolerance_m = spacing_m, tolerance_m
         self._trails: Trails | None = None
         self._drawn: list[int] = []
         self._sealed: dict[str, viser.LineSegmentsHandle] = {}
@@ -103,7 +105,7 @@ class MotionScene:
         if not chunks:
             return
         chunks_m = np.array([points_m for _, points_m in chunks])
-        segments, of_chunk = joined_where(chunks_m, thinned(chunks_m, self._spacing_m * TOLERANCE_SHARE))
+        segments, of_chunk = joined_where(chunks_m, thinned(chunks_m, self._tolerance_m))
         own = np.array([self._colours[index] for index, _ in chunks], dtype=np.uint8)
         new, gone = self._lines.add(segments, own[of_chunk])
         for line in gone:

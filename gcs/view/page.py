@@ -49,7 +49,8 @@ VEHICLE_FLATNESS = 0.6
 SELECTED, WARNING, ALARM = 1, 2, 3
 """How urgent a tag is."""
 LOOKS = {Tone.BAD: (ALARM, "vehicle bad"), Tone.WARN: (WARNING, "vehicle warn")}
-TRAIL_SPACING_SHARE = 1 / 2000
+TRAIL_SPACING_SHARE, TRAIL_TOLERANCE_SHARE = 1 / 2000, 1 / 1000
+"""Of the size of the world: what is not seen of trails where all of it is in the picture."""
 POINT_SHARE = 1 / 350
 LEAST_TRAIL_SPACING_M = 0.05
 
@@ -162,9 +163,9 @@ class Page:
         self._size_m = self._draw_surroundings()
         self._plan = PlanScene(scene, self._size_m * POINT_SHARE)
         self._observed = ObservedScene(scene)
-        self._motion = MotionScene(
-            scene, max(LEAST_TRAIL_SPACING_M, self._size_m * TRAIL_SPACING_SHARE), self._ground_height_m
-        )
+        spacing_m = max(LEAST_TRAIL_SPACING_M, self._size_m * TRAIL_SPACING_SHARE)
+        tolerance_m = max(spacing_m / 2, self._size_m * TRAIL_TOLERANCE_SHARE)
+        self._motion = MotionScene(scene, spacing_m, tolerance_m, self._ground_height_m)
 
     def _legend(self) -> str:
         return legend.render(self._desk.mission, self._theme, simulated=self._desk.simulated)
