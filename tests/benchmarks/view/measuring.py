@@ -11,7 +11,7 @@ import numpy.typing as npt
 from playwright.async_api import Browser, async_playwright
 
 from gcs.view.page import Page
-from gcs.view.server import UPDATE_INTERVAL_S, close_server, open_server
+from gcs.view.server import UPDATE_INTERVAL_S, close_server, open_server, spare_the_collector
 from tests.benchmarks.view.circling_fleet import CirclingFleet
 from tests.browser.chromium import ARGUMENTS, find_chromium
 from tests.browser.loopback import HOST, free_port
@@ -62,6 +62,7 @@ async def kept_page(fleet: CirclingFleet) -> AsyncIterator[Kept]:
     kept = Kept(free_port())
     server = open_server(HOST, kept.port)
     page = Page(server, fleet.desk)
+    spare_the_collector()
     keeping = asyncio.create_task(_keep(page, fleet, kept))
     try:
         yield kept
