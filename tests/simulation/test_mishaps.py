@@ -46,6 +46,15 @@ def test_a_ground_station_that_crashes_before_the_take_off_begins_anew():
     assert system.flight.success, system.error
 
 
+def test_what_the_ground_station_says_to_be_stored_is_looked_up_on_the_vehicle():
+    system = flown()
+    assert kinds(system).count("uploaded") == 2
+    assert not system.false_beliefs
+    system.events.add("uploaded", "another mission than is stored", "alpha", plan_id=77)
+    (belief,) = system.false_beliefs
+    assert "alpha uploaded 0000004d" in belief
+
+
 def test_a_crashed_ground_station_sends_nothing_any_more():
     system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1)
     system.process.ended = True
