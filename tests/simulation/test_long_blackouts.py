@@ -28,6 +28,8 @@ PILLAR = Cylinder(name="pillar", centre_m=(12.0, 10.2), radius_m=0.4, top_m=4.0,
 UNMAPPED = msgspec.structs.replace(
     INDOOR, world=msgspec.structs.replace(INDOOR.world, cylinders=(*INDOOR.world.cylinders, PILLAR))
 )
+SEVERAL = {"PARAM_SET", "MAV_CMD_SET_MESSAGE_INTERVAL"}
+"""Orders with several things to set."""
 CUT_AT_S = 9.0
 """After the first take-off."""
 REST_OF_THE_FLIGHT_S = INDOOR.limits.endurance_s + 100.0
@@ -74,7 +76,7 @@ def assert_flown_and_seen(system: WholeSystem) -> None:
     assert {tuple(v) for v in system.station.fleet.observed.voxels.tolist()} == on_board
 
 
-@pytest.mark.parametrize("blackout_s", [10.0, 60.0, REST_OF_THE_FLIGHT_S])
+@pytest.mark.parametrize("blackout_s", [10.0, 60.0, pytest.param(REST_OF_THE_FLIGHT_S, marks=pytest.mark.slow)])
 def test_vehicles_fly_on_through_a_blackout_and_nothing_is_sent_twice(blackout_s: float):
     system = Audited(UNMAPPED, seed=1)
     system.simulator.order(LinkFault(link=SimulatedLink.GROUND, blackout_s=blackout_s, at_s=CUT_AT_S))
@@ -86,8 +88,10 @@ def test_vehicles_fly_on_through_a_blackout_and_nothing_is_sent_twice(blackout_s
     swaps = Counter(event.vehicle for event in system.events.events if event.kind in {"swapped", "swap failed"})
     for (sysid, order), times in sent(system).items():
         name = UNMAPPED.vehicle(sysid).name
-        allowed = 1 + swaps[name] if order in {"upload of a mission", "MISSION_SET_CURRENT"} else 1
-        assert times <= allowed or "MESSAGE" in order, (name, order)
+        if order in {"upload of a mission", "MISSION_SET_CURRENT"}:
+            assert times <= 1 + swaps[name]
+        elif order not in SEVERAL:
+            assert times == 1, (name, order)
 
 
 def test_reports_shrink_in_a_blackout_and_grow_back_after_it():
@@ -98,7 +102,7 @@ def test_reports_shrink_in_a_blackout_and_grow_back_after_it():
     begun_s = next(time_s for time_s, sizes, _ in system.truth if sizes[:, 2].max() > 0.1) + CUT_AT_S
     assert system.least_budget_bytes_s(0.0, begun_s) == full_bytes_s
     assert system.least_budget_bytes_s(begun_s, begun_s + 9.0) == pytest.approx(LEAST_SHARE * full_bytes_s)
-    assert system.budgets_bytes_s[-1][1] == full_bytes_s
+    assert system.budgets_bytes_s[-1][1] >= 0.5 * full_bytes_s
 
 
 class Connection(GroundWire):
