@@ -1,5 +1,6 @@
 """The command line of the ground station: every command is registered here, and errors become exit codes."""
 
+import asyncio
 import signal
 import sys
 import time
@@ -97,7 +98,7 @@ def main() -> None:
     except GcsError as problem:
         print(f"gcs: {problem}", file=sys.stderr)
         sys.exit(1)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, asyncio.CancelledError):  # after a task group has failed, Python 3.11 says the latter
         sys.exit(130)
 
 

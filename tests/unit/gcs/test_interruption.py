@@ -1,0 +1,41 @@
+"""Ctrl-C, at any time, is an exit code and no traceback."""
+
+import asyncio
+import os
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from gcs import cli
+
+LONG_S = 30.0
+
+
+@pytest.fixture(autouse=True)
+def own_signals() -> Iterator[None]:
+    before = signal.getsignal(signal.SIGTERM)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+async def refused() -> None:
+    await asyncio.sleep(0.01)
+    raise ConnectionRefusedError
+
+
+async def a_session_in_which_something_has_failed() -> None:
+    """A failed task group leaves a cancellation request behind on Python 3.11."""
+    try:
+        async with asyncio.TaskGroup() as group:
+            group.create_task(refused())
+    except* ConnectionRefusedError:
+        asyncio.get_running_loop().call_soon(os.kill, os.getpid(), signal.SIGINT)
+    await asyncio.sleep(LONG_S)
+
+
+def test_ctrl_c_after_a_failure_is_told_from_a_crash(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(cli, "app", lambda standalone_mode: asyncio.run(a_session_in_which_something_has_failed()))
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 130
