@@ -30,9 +30,16 @@ UNMAPPED = msgspec.structs.replace(
 )
 SEVERAL = {"PARAM_SET", "MAV_CMD_SET_MESSAGE_INTERVAL"}
 """Orders with several things to set."""
+LISTENS_S = 8.0
 CUT_AT_S = 9.0
 """After the first take-off."""
 REST_OF_THE_FLIGHT_S = INDOOR.limits.endurance_s + 100.0
+
+
+async def fly_and_listen(flight: FleetFlight) -> None:
+    """The whole flight, and a turn of the companions' repetitions after it."""
+    await flight.fly()
+    await asyncio.sleep(LISTENS_S)
 
 
 class Audited(WholeSystem):
@@ -40,6 +47,7 @@ class Audited(WholeSystem):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.operate = fly_and_listen
         self.orders: list[dict[str, Any]] = []
         self.budgets_bytes_s: list[tuple[float, float]] = []
         self.station.audit = Audit(self._note, lambda: 0)
@@ -76,7 +84,9 @@ def assert_flown_and_seen(system: WholeSystem) -> None:
     assert {tuple(v) for v in system.station.fleet.observed.voxels.tolist()} == on_board
 
 
-@pytest.mark.parametrize("blackout_s", [10.0, 60.0, pytest.param(REST_OF_THE_FLIGHT_S, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "blackout_s", [10.0, *(pytest.param(s, marks=pytest.mark.slow) for s in (60.0, REST_OF_THE_FLIGHT_S))]
+)
 def test_vehicles_fly_on_through_a_blackout_and_nothing_is_sent_twice(blackout_s: float):
     system = Audited(UNMAPPED, seed=1)
     system.simulator.order(LinkFault(link=SimulatedLink.GROUND, blackout_s=blackout_s, at_s=CUT_AT_S))
@@ -155,6 +165,7 @@ class Crashing(Audited):
         heartbeats = asyncio.create_task(self.station.send_heartbeats())
         await rejoin(self.flight, self.events)
         await self.flight.watch()
+        await asyncio.sleep(LISTENS_S)
         heartbeats.cancel()
 
 
