@@ -150,7 +150,7 @@ class Preparation(Operation):
             return "its companion sends no status"
         if status.plan_id != expected:
             return f"its companion has plan {status.plan_id:08x}, uploaded was {expected:08x}"
-        return f"its companion is {describe(status.state, status.reason)}"
+        return f"after {COMPANION_READY_TIMEOUT_S:g} s its companion is still {describe(status.state, status.reason)}"
 
 
 def mission_items(

@@ -14,9 +14,9 @@ import viser
 from gcs.view.framing import Pose
 from gcs.view.labels import Lens
 from gcs.view.overlay import Overlay, Tag
-from gcs.view.sightings import Sighting
+from gcs.view.sightings import Sightings
 from gcs.view.theme import Theme
-from gcs.view.vehicle_scene import MANY, GroundHeight, Pick, VehicleScene
+from gcs.view.vehicle_scene import MANY, Pick, VehicleScene
 
 Array = npt.NDArray[np.float64]
 
@@ -31,19 +31,16 @@ class Browser:
 
     Args:
         client: viser's handle of it.
-        ground_height_m: see `VehicleScene`.
         on_pick: see `VehicleScene`.
         theme: dark or light.
         legend: HTML that stays below the overlay.
     """
 
-    def __init__(
-        self, client: viser.ClientHandle, ground_height_m: GroundHeight, on_pick: Pick, theme: Theme, legend: str
-    ) -> None:
+    def __init__(self, client: viser.ClientHandle, on_pick: Pick, theme: Theme, legend: str) -> None:
         self._client, self._loop = client, asyncio.get_running_loop()
-        self._vehicles = VehicleScene(client.scene, ground_height_m, on_pick, theme)
+        self._vehicles = VehicleScene(client.scene, on_pick, theme)
         self._overlay, self._tags, self._places_m = Overlay(), [], np.zeros((0, 3))
-        self._drawn: Lens | None = None
+        self._lens, self._drawn = self._look(), False
         self._waiting, self._updates = False, 0
         panel = client.gui.add_panel()
         with panel.add_tab(" "):
@@ -53,23 +50,15 @@ class Browser:
         panel.float(x=0, y=0, width=100)
         client.camera.on_update(self._camera_moved)
 
-    @property
-    def lens(self) -> Lens:
-        """Where its camera is now."""
-        camera = self._client.camera
-        pose = Pose(camera.position, camera.look_at)
-        return Lens(pose, camera.fov, max(camera.image_width, 1), max(camera.image_height, 1))
-
-    def update(self, seen: Sequence[Sighting], tags: Sequence[Tag], places_m: Array) -> None:
+    def update(self, seen: Sightings, tags: Sequence[Tag], places_m: Array) -> None:
         """Bring it up to date: vehicles, and the (n, 3) places of what has a tag."""
-        lens = self.lens
-        self._tags, self._places_m = list(tags), places_m
+        self._follow()
+        self._tags, self._places_m = tags, places_m
         self._updates += 1
         with self._client.atomic():
-            self._vehicles.move(seen, lens)
+            self._vehicles.move(seen, self._lens)
             if len(seen) <= MANY or self._updates % SLOWER:
-                self._html.content = self._overlay.render(self._tags, self._places_m, lens)
-                self._drawn = lens
+                self._draw()
 
     def explain(self, legend: str) -> None:
         """Show this legend from now on."""
@@ -90,10 +79,25 @@ class Browser:
 
     def _follow_camera(self) -> None:
         self._waiting = False
-        lens = self.lens
-        if self._drawn is not None and not _same(lens, self._drawn):
-            self._drawn = lens
-            self._html.content = self._overlay.render(self._tags, self._places_m, lens)
+        drawn = self._drawn
+        self._follow()
+        if drawn and not self._drawn:
+            self._draw()
+
+    def _draw(self) -> None:
+        self._drawn = True
+        self._html.content = self._overlay.render(self._tags, self._places_m, self._lens)
+
+    def _follow(self) -> None:
+        """See where the camera is now; what was worked out for it holds as long as it stands still."""
+        lens = self._look()
+        if not _same(lens, self._lens):
+            self._lens, self._drawn = lens, False
+
+    def _look(self) -> Lens:
+        camera = self._client.camera
+        pose = Pose(camera.position, camera.look_at)
+        return Lens(pose, camera.fov, max(camera.image_width, 1), max(camera.image_height, 1))
 
 
 def _same(one: Lens, other: Lens) -> bool:

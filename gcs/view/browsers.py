@@ -10,7 +10,7 @@ import viser
 
 from gcs.view.browser import Browser
 from gcs.view.overlay import Tag
-from gcs.view.sightings import Sighting
+from gcs.view.sightings import Sightings
 from gcs.view.theme import Theme
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +28,7 @@ class Browsers:
         self._server, self._make = server, make
         self._browsers: dict[int, Browser] = {}
 
-    def update(self, seen: Sequence[Sighting], tags: Sequence[Tag], places_m: Array) -> None:
+    def update(self, seen: Sightings, tags: Sequence[Tag], places_m: Array) -> None:
         """Bring every browser up to date; (n, 3) places of what has a tag."""
         clients = self._server.get_clients()
         self._browsers = {key: browser for key, browser in self._browsers.items() if key in clients}

@@ -1,13 +1,11 @@
 """The browsers' cameras: the whole world at first, a view from above, or along with a vehicle."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import numpy.typing as npt
 import viser
 
 from gcs.view.framing import FOV_RAD, FROM_ABOVE, FROM_SOUTH_WEST, Margins, Pose, frame_box
-from gcs.view.sightings import Sighting
+from gcs.view.sightings import Sighting, Sightings
 
 Array = npt.NDArray[np.float64]
 
@@ -60,7 +58,7 @@ class Cameras:
         towards = FOLLOW_TOWARDS / np.linalg.norm(FOLLOW_TOWARDS)
         self._place(client, Pose(vehicle.position_m + FOLLOW_M * towards, vehicle.position_m))
 
-    def move(self, seen: Sequence[Sighting]) -> None:
+    def move(self, seen: Sightings) -> None:
         """Take the cameras that follow a vehicle along with it."""
         if not self._followed:
             return

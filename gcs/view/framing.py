@@ -35,9 +35,9 @@ class Margins:
 def camera_axes(towards_camera: Array) -> tuple[Array, Array, Array]:
     """Unit vectors (3,) to the right, upwards and towards the camera of a picture taken from a direction."""
     back = towards_camera / np.linalg.norm(towards_camera)
-    right = np.cross([0.0, 0.0, 1.0], back)
-    right /= np.linalg.norm(right)
-    return right, np.cross(back, right), back
+    right = np.array([-back[1], back[0], 0.0]) / np.hypot(back[0], back[1])
+    up = np.array([-back[2] * right[1], back[2] * right[0], back[0] * right[1] - back[1] * right[0]])
+    return right, up, back
 
 
 def frame_box(low_m: Array, high_m: Array, towards_camera: Array, aspect: float, margins: Margins) -> Pose:

@@ -5,6 +5,7 @@ from html import escape
 
 from gcs.view.colours import PALETTE, THREAT, UNMAPPED, Rgb, css
 from gcs.view.theme import Theme
+from gcs.view.vehicle_scene import MANY
 from missions.mission import Mission
 
 VEHICLE = PALETTE[0]
@@ -25,11 +26,13 @@ def render(mission: Mission | None, theme: Theme, *, simulated: bool) -> str:
 
 def _entries(mission: Mission | None, theme: Theme, simulated: bool) -> Iterator[Entry]:
     yield "line", theme.line_ahead(VEHICLE), "flown next (on board)"
-    yield "line", theme.line_behind(VEHICLE), "flown so far"
+    many = mission is not None and len(mission.vehicles) > MANY
+    yield "line", theme.line_behind(VEHICLE, many=many), "flown so far"
     if mission is None:
         return
-    yield "thin", theme.line_planned(VEHICLE), "planned by the cloud"
-    yield "dot", theme.line_planned(VEHICLE), "track point"
+    yield "thin", theme.line_planned(VEHICLE, many=many), "planned by the cloud"
+    if not many:
+        yield "dot", theme.line_planned(VEHICLE, many=False), "track point"
     yield "diamond", VEHICLE, "target, in its vehicle's colour"
     yield "area", theme.bounds, "flight range"
     yield "dashed", theme.fence, "geofence"

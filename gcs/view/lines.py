@@ -11,12 +11,14 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from gcs.fleet.vehicle_state import CompanionView
+from gcs.fleet.vehicle_state import LINK_TIMEOUT_S, CompanionView
 from gcs.flight.trails import Trail
 from missions.bspline import uniform_rows
 from missions.tunnel import CompanionState
 
 Array = npt.NDArray[np.float64]
+Segments = npt.NDArray[np.float32]
+"""As they are sent."""
 Colours = npt.NDArray[np.uint8]
 
 CHUNK = 10
@@ -25,8 +27,11 @@ AHEAD = 16
 """Points of the line that shows what a companion is about to fly."""
 BATCH, MERGE, MOST_SEGMENTS = 320, 8, 2_560
 """Sealed segments go out in batches; `MERGE` batches become one line, until it has more than `MOST_SEGMENTS`."""
-MOST_OF_ALL = 40_000
-"""Segments of all lines; the oldest ones are taken away then, so that a browser can come late in any flight."""
+MOST_OF_ALL = 16_000
+"""Segments of all lines; the oldest ones are taken away then, so that a browser can come late in any flight.
+
+Each is six triangles: this many are 0.1 million, which a machine without a graphics card draws as well.
+"""
 CATCH_UP = 6
 """Of a trail that has grown by no more points than this since the last look, the newest one is enough."""
 
@@ -63,7 +68,7 @@ class FleetTrails:
             self._read[grown] = counts[grown]
         return chunks
 
-    def segments(self, positions_m: Array) -> Array:
+    def segments(self, positions_m: Array) -> Segments:
         """(n * CHUNK, 2, 3) what is not sealed yet, up to where the vehicles (n, 3) are."""
         filled = (np.arange(CHUNK) < self._live[:, None])[..., None]
         return _joined(np.where(filled, self._tails_m, positions_m[:, None]), positions_m[:, None])
@@ -191,49 +196,49 @@ class SealedLines:
         return SealedLine(f"{self._names}", segments, colours, rank)
 
 
-@dataclass
-class AheadLine:
-    """What a companion is about to fly."""
+class WaysAhead:
+    """What the companions of all vehicles of an order are about to fly.
 
-    points_m: Array | None = None
-    """(AHEAD, 3) along its trajectory; None before they were worked out."""
-    control_m: Array = field(default_factory=lambda: np.zeros((4, 3)))
-    """(n, 3) control points of its trajectory."""
-    shown: bool = False
-    _revision: int | None = None
+    Args:
+        count: how many vehicles.
+    """
 
-    def take(self, companion: CompanionView, *, alive: bool) -> None:
-        """Take in what the companion has said last; while it does not steer, nothing is shown."""
-        status, trajectory = companion.status, companion.trajectory
-        self.shown = trajectory is not None and alive and status is not None and status.state in STEERING
-        if self.shown and trajectory is not None and companion.trajectory_revision != self._revision:
-            self._revision = companion.trajectory_revision
-            self.control_m, self.points_m = trajectory.control_points_m, None
+    def __init__(self, count: int) -> None:
+        self._points_m = np.zeros((count, AHEAD, 3))
+        self._shown = np.zeros(count, dtype=bool)
+        self._revisions: list[int | None] = [None] * count
 
+    def take(self, companions: Sequence[CompanionView], now_s: float) -> None:
+        """Take in what they have said last; of those that do not steer, or are silent, nothing is shown."""
+        shown, new = list[bool](), dict[int, list[tuple[int, Array]]]()
+        for index, companion in enumerate(companions):
+            status, trajectory = companion.status, companion.trajectory
+            steers = status is not None and status.state in STEERING and now_s - companion.heard_s < LINK_TIMEOUT_S
+            shown.append(steers and trajectory is not None)
+            if shown[-1] and trajectory is not None and companion.trajectory_revision != self._revisions[index]:
+                self._revisions[index] = companion.trajectory_revision
+                control_m = trajectory.control_points_m
+                new.setdefault(len(control_m), []).append((index, control_m))
+        self._shown[:] = shown
+        for count, alike in new.items():  # trajectories of as many control points at once
+            self._points_m[[index for index, _ in alike]] = _basis(count) @ np.array([own for _, own in alike])
 
-def ways_ahead(lines: list[AheadLine], positions_m: Array) -> Array:
-    """(n * AHEAD, 2, 3) segments of what lies ahead of n vehicles at (n, 3) positions, from each vehicle onwards."""
-    _work_out([line for line in lines if line.points_m is None])
-    shown = np.array([line.shown for line in lines])
-    points_m = np.array([line.points_m for line in lines])
-    points_m = np.where(shown[:, None, None], points_m, positions_m[:, None])
-    nearest = np.argmin(np.sum((points_m - positions_m[:, None]) ** 2, axis=2), axis=1)
-    following = np.minimum(nearest[:, None] + 1 + np.arange(AHEAD), AHEAD - 1)
-    return _joined(positions_m[:, None], np.take_along_axis(points_m, following[..., None], axis=1))
-
-
-def _work_out(lines: list[AheadLine]) -> None:
-    """Points along new trajectories, those of as many control points at once."""
-    for count in {len(line.control_m) for line in lines}:
-        alike = [line for line in lines if len(line.control_m) == count]
-        for line, points_m in zip(alike, _basis(count) @ np.array([line.control_m for line in alike]), strict=True):
-            line.points_m = points_m
+    def segments(self, positions_m: Array) -> Segments:
+        """(n * AHEAD, 2, 3) of what lies ahead of the vehicles at (n, 3) positions, from each vehicle onwards."""
+        points_m = np.where(self._shown[:, None, None], self._points_m, positions_m[:, None])
+        away_m = points_m - positions_m[:, None]
+        nearest = np.argmin(np.einsum("nak,nak->na", away_m, away_m), axis=1)
+        following = np.minimum(nearest[:, None] + 1 + np.arange(AHEAD), AHEAD - 1)
+        return _joined(positions_m[:, None], points_m[np.arange(len(points_m))[:, None], following])
 
 
-def _joined(first_m: Array, then_m: Array) -> Array:
+def _joined(first_m: Array, then_m: Array) -> Segments:
     """Segments (n * k, 2, 3) along n polylines of k + 1 points, each given in two parts (n, ., 3)."""
+    count, steps = then_m.shape[0], first_m.shape[1] + then_m.shape[1] - 1
+    segments = np.empty((count, steps, 2, 3), dtype=np.float32)
     points_m = np.concatenate((first_m, then_m), axis=1)
-    return np.stack((points_m[:, :-1], points_m[:, 1:]), axis=2).reshape(-1, 2, 3)
+    segments[:, :, 0], segments[:, :, 1] = points_m[:, :-1], points_m[:, 1:]
+    return segments.reshape(-1, 2, 3)
 
 
 @lru_cache(maxsize=32)

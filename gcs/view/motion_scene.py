@@ -1,10 +1,10 @@
-"""Where the vehicles have been and what lies ahead of them, as it is drawn for all browsers.
+"""Where the vehicles have been, what lies ahead of them and what is below, as it is drawn for all browsers.
 
 Of each trail only the newest part is sent at every update; what is older is sealed, thinned, and merged now and then,
 so that a browser that comes late in a long flight is sent few lines.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -16,85 +16,88 @@ from gcs.view.colours import Rgb, vivid
 from gcs.view.lines import (
     AHEAD,
     CHUNK,
-    AheadLine,
     FleetTrails,
     SealedLine,
     SealedLines,
+    WaysAhead,
     joined_where,
     thinned,
-    ways_ahead,
 )
-from gcs.view.sightings import Sighting
+from gcs.view.sightings import Sightings
 from gcs.view.theme import DARK, Theme
 from gcs.view.vehicle_scene import MANY
 
 Array = npt.NDArray[np.float64]
+GroundHeight = Callable[[Array], Array]
+"""(n,) height of the ground [m] below (n, 2) places."""
 
-TRAIL_PX, AHEAD_PX = 2.5, 5.0
-TOLERANCE_SHARE = 0.5
-"""By how much a thinned trail may be off, of its points' spacing."""
+TRAIL_PX, AHEAD_PX, STEM_PX = 2.5, 5.0, 1.0
+TRAIL_OF_MANY_PX, AHEAD_OF_MANY_PX = 1.5, 3.0
 SLOWER = 2
 """In a large fleet, what lies ahead is sent at every second update."""
 
 
 class MotionScene:
-    """Trails and companions' trajectories of all vehicles.
+    """Trails and companions' trajectories of all vehicles, and the stems that show where above the ground they are.
 
     Args:
         scene: of the page.
         spacing_m: between two points of a trail, at least.
+        tolerance_m: by how much a trail may be off where points are left out of it.
+        ground_height_m: see `GroundHeight`.
     """
 
-    def __init__(self, scene: viser.SceneApi, spacing_m: float) -> None:
-        self._scene, self._spacing_m = scene, spacing_m
+    def __init__(
+        self, scene: viser.SceneApi, spacing_m: float, tolerance_m: float, ground_height_m: GroundHeight
+    ) -> None:
+        self._scene, self._ground_height_m = scene, ground_height_m
+        self._spacing_m, self._tolerance_m = spacing_m, tolerance_m
         self._trails: Trails | None = None
         self._drawn: list[int] = []
-        self._future: dict[int, AheadLine] = {}
         self._sealed: dict[str, viser.LineSegmentsHandle] = {}
         self._updates, self._theme = 0, DARK
-        self._begin([])
+        self._begin(Sightings())
 
     def use(self, theme: Theme) -> None:
         """Draw lines for a dark or a light page from now on."""
         if theme is not self._theme:
             self._theme, self._trails = theme, None
 
-    def update(self, desk: Desk, seen: Sequence[Sighting], now_s: float) -> None:
+    def update(self, desk: Desk, seen: Sightings, now_s: float) -> None:
         """Follow the vehicles to where they are now."""
-        order = [sighting.sysid for sighting in seen]
-        if desk.trails is not self._trails or order != self._drawn:
+        if desk.trails is not self._trails or seen.sysids != self._drawn:
             self._trails = desk.trails
             self._begin(seen)
         if not seen or self._trails is None:
             return
-        positions_m = np.array([sighting.position_m for sighting in seen])
-        by_sysid = self._trails.by_sysid
-        self._seal(self._past.take([by_sysid.get(sysid) for sysid in order]))
+        self._seal(self._past.take([self._trails.by_sysid.get(sysid) for sysid in seen.sysids]))
         self._send_batch()
-        self._tails.points = self._past.segments(positions_m).astype(np.float32)
+        self._tails.points = self._past.segments(seen.positions_m)
+        self._stems.points = self._stem_lines(seen.positions_m)
         self._updates += 1
         if len(seen) <= MANY or self._updates % SLOWER == 0:
-            self._look_ahead(seen, positions_m, now_s)
+            self._future.take([state.companion for state in seen.states], now_s)
+            self._ahead.points = self._future.segments(seen.positions_m)
 
-    def _look_ahead(self, seen: Sequence[Sighting], positions_m: Array, now_s: float) -> None:
-        ahead = []
-        for sighting in seen:
-            line = self._future.setdefault(sighting.sysid, AheadLine())
-            line.take(sighting.state.companion, alive=sighting.state.companion_online(now_s))
-            ahead.append(line)
-        self._ahead.points = ways_ahead(ahead, positions_m).astype(np.float32)
+    def _stem_lines(self, positions_m: Array) -> npt.NDArray[np.float32]:
+        stems = np.repeat(positions_m[:, None].astype(np.float32), 2, axis=1)
+        stems[:, 0, 2] = self._ground_height_m(positions_m[:, :2])
+        return stems
 
-    def _begin(self, seen: Sequence[Sighting]) -> None:
+    def _begin(self, seen: Sightings) -> None:
         """Begin anew: another frame, other vehicles, or another place in a recording."""
         for handle in self._sealed.values():
             handle.remove()
         self._sealed, self._lines, self._batch_sent = {}, SealedLines(), True
-        self._drawn, self._past = [sighting.sysid for sighting in seen], FleetTrails(len(seen), self._spacing_m)
-        self._colours = [self._theme.line_behind(vivid(sighting.colour)) for sighting in seen]
-        self._tails = self._live("/fleet/tails", CHUNK, self._colours, TRAIL_PX)
-        self._ahead = self._live(
-            "/fleet/ahead", AHEAD, [self._theme.line_ahead(vivid(s.colour)) for s in seen], AHEAD_PX
-        )
+        self._drawn, self._past = seen.sysids, FleetTrails(len(seen), self._spacing_m)
+        self._future = WaysAhead(len(seen))
+        own = [vivid(colour) for colour in seen.colours]
+        many = len(seen) > MANY
+        self._colours = [self._theme.line_behind(colour, many=many) for colour in own]
+        self._trail_px, ahead_px = (TRAIL_OF_MANY_PX, AHEAD_OF_MANY_PX) if many else (TRAIL_PX, AHEAD_PX)
+        self._tails = self._live("/fleet/tails", CHUNK, self._colours, self._trail_px)
+        self._ahead = self._live("/fleet/ahead", AHEAD, [self._theme.line_ahead(colour) for colour in own], ahead_px)
+        self._stems = self._live("/fleet/stems", 1, own, STEM_PX)
         self._batch = self._line("/trails/newest", self._lines.batch, self._lines.colours, visible=False)
 
     def _seal(self, chunks: Sequence[tuple[int, Array]]) -> None:
@@ -102,7 +105,7 @@ class MotionScene:
         if not chunks:
             return
         chunks_m = np.array([points_m for _, points_m in chunks])
-        segments, of_chunk = joined_where(chunks_m, thinned(chunks_m, self._spacing_m * TOLERANCE_SHARE))
+        segments, of_chunk = joined_where(chunks_m, thinned(chunks_m, self._tolerance_m))
         own = np.array([self._colours[index] for index, _ in chunks], dtype=np.uint8)
         new, gone = self._lines.add(segments, own[of_chunk])
         for line in gone:
@@ -126,7 +129,7 @@ class MotionScene:
         self, name: str, segments: Array, colours: npt.NDArray[np.uint8], *, visible: bool
     ) -> viser.LineSegmentsHandle:
         return self._scene.add_line_segments(
-            name, segments, colours, thickness=TRAIL_PX, thickness_units="screen", visible=visible
+            name, segments, colours, thickness=self._trail_px, thickness_units="screen", visible=visible
         )
 
     def _live(self, name: str, per_vehicle: int, own: Sequence[Rgb], width_px: float) -> viser.LineSegmentsHandle:

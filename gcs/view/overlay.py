@@ -1,6 +1,7 @@
 """What lies over one browser's picture: name tags, marks of what is out of the picture, compass, scale bar; pure HTML.
 
-The server knows each browser's camera, so it says where everything stands, in pixels; the look is in `overlay.css`.
+The server knows each browser's camera, so it says where everything stands, in pixels of the picture. Those are not the
+screen's own where a browser draws more or fewer of them: `overlay.css` knows how large they are there.
 """
 
 import math
@@ -72,7 +73,7 @@ class Overlay:
         """The HTML for tags of what is at (n, 3) places."""
         pixels, seen = lens.project(places_m)
         parts = [self._tags(tags, pixels, seen, lens), _arrows(tags, places_m, seen, lens), _compass(lens), _bar(lens)]
-        size = f"width:{lens.width_px}px;height:{lens.height_px}px"
+        size = f"--width:{lens.width_px};--height:{lens.height_px}"
         return f'<div class="gcs-overlay" style="{size}">{"".join(parts)}</div>'
 
     def _tags(self, tags: Sequence[Tag], pixels: Array, seen: npt.NDArray[np.bool_], lens: Lens) -> str:
@@ -97,8 +98,9 @@ class Overlay:
             if x == x:  # not a number: there was no room
                 tag = tags[index]
                 before, after = _label(tag.name, text, tag.colour, tag.look, tag.selected)
-                labels.append(f"{before}{x:.0f}px;top:{y:.0f}px{after}")
-        return f"<svg>{stems}</svg>{''.join(labels)}"
+                labels.append(f"{before}{x:.0f};--y:{y:.0f}{after}")
+        box = f"0 0 {lens.width_px} {lens.height_px}"
+        return f'<svg viewBox="{box}" preserveAspectRatio="none">{stems}</svg>{"".join(labels)}'
 
     def _settle(
         self, keys: Sequence[str], pixels: Array, sizes: Array, spans: Array, lens: Lens, *, rings: int
@@ -116,7 +118,7 @@ def _label(name: str, details: str, colour: Rgb, look: str, selected: bool) -> t
     """A tag's HTML before and after the pixel where it stands, which alone changes all the time."""
     told = f"<span>{escape(details)}</span>" if details else ""
     look = f"{look} sel" if selected else look
-    return f'<div class="tag {look}" style="left:', f';--own:{css(colour)}"><b>{escape(name)}</b>{told}</div>'
+    return f'<div class="tag {look}" style="--x:', f';--own:{css(colour)}"><b>{escape(name)}</b>{told}</div>'
 
 
 def _stems(tags: Sequence[Tag], anchors: Array, offsets: Array, sizes: Array) -> str:
@@ -158,7 +160,7 @@ def _arrows(tags: Sequence[Tag], places_m: Array, seen: npt.NDArray[np.bool_], l
         hidden, across / reach, down / reach, np.degrees(np.arctan2(down, across)), strict=True
     ):
         left, top = lens.width_px / 2 + x, lens.height_px / 2 + y
-        place = f"left:{left:.0f}px;top:{top:.0f}px;color:{css(tags[index].colour)};--turn:{round(angle)}deg"
+        place = f"--x:{left:.0f};--y:{top:.0f};color:{css(tags[index].colour)};--turn:{round(angle)}deg"
         marks.append(f'<i class="out" style="{place}" title="{escape(tags[index].name)}"></i>')
     return "".join(marks)
 
@@ -180,7 +182,7 @@ def _bar(lens: Lens) -> str:
     metres = BAR_PX * float(lens.metres_per_pixel(lens.pose.look_at_m[None])[0])
     power = 10.0 ** math.floor(math.log10(metres))
     length_m = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= metres)
-    return f'<div class="scale" style="width:{BAR_PX * length_m / metres:.0f}px">{length_words(length_m)}</div>'
+    return f'<div class="scale" style="--long:{BAR_PX * length_m / metres:.0f}">{length_words(length_m)}</div>'
 
 
 def length_words(length_m: float) -> str:

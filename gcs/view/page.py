@@ -1,6 +1,7 @@
 """One desk's page: what stands in the scene and in the panels, and how often each is brought up to date."""
 
 import asyncio
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -18,12 +19,12 @@ from gcs.view.colours import BRAND, TARGET, Tone
 from gcs.view.editing_panel import EditingPanel
 from gcs.view.motion_scene import MotionScene
 from gcs.view.observed_scene import ObservedScene
-from gcs.view.overlay import Tag
+from gcs.view.overlay import FEW, Tag
 from gcs.view.panels import Panels, Press
 from gcs.view.plan_scene import PlanScene
 from gcs.view.replay_panel import ReplayPanel
 from gcs.view.seating import Seating
-from gcs.view.sightings import Sighting, sightings, vehicle_colours, vehicle_order
+from gcs.view.sightings import Sighting, Sightings, sightings, vehicle_colours, vehicle_order
 from gcs.view.theme import DARK, LIGHT, Theme
 from gcs.view.vehicle_scene import MANY, least_span_px
 from gcs.view.world_scene import OnPick, WorldScene, diagonal_m
@@ -33,8 +34,8 @@ from missions.mission_file import to_yaml
 Array = npt.NDArray[np.float64]
 
 TITLE = "End-cloud GCS"
-TELL_INTERVAL_S, TELL_OF_MANY_S = 0.25, 0.5
-"""Panels and signs change this often, those of large fleets less; what moves is updated at every call."""
+TELL_INTERVAL_S = 0.25
+"""Panels and signs change this often, those of large fleets a part at every update; what moves, at every update."""
 
 WATCHED_M = np.array([[-30.0, -30.0, 0.0], [30.0, 30.0, 15.0]])
 """What is framed where there is no mission, around where the first vehicle has its home."""
@@ -47,7 +48,9 @@ VEHICLE_FLATNESS = 0.6
 """A quadrotor is less high than wide in a picture from above."""
 SELECTED, WARNING, ALARM = 1, 2, 3
 """How urgent a tag is."""
-TRAIL_SPACING_SHARE = 1 / 2000
+LOOKS = {Tone.BAD: (ALARM, "vehicle bad"), Tone.WARN: (WARNING, "vehicle warn")}
+TRAIL_SPACING_SHARE, TRAIL_TOLERANCE_SHARE = 1 / 2000, 1 / 1000
+"""Of the size of the world: what is not seen of trails where all of it is in the picture."""
 POINT_SHARE = 1 / 350
 LEAST_TRAIL_SPACING_M = 0.05
 
@@ -62,8 +65,8 @@ class Page:
 
     def __init__(self, server: viser.ViserServer, desk: Desk) -> None:
         self._server, self._desk, self._loop = server, desk, asyncio.get_running_loop()
-        self._next_tell_s = -np.inf
-        self._seen: list[Sighting] = []
+        self._next_tell_s, self._turn = -np.inf, 0
+        self._seen = Sightings()
         self._tags: list[Tag] = []
         self._theme = DARK
         server.gui.set_panel_label(TITLE)
@@ -101,21 +104,35 @@ class Page:
         with self._server.atomic():  # around everything: what it sends is packed by another thread, from its end on
             self._motion.update(self._desk, self._seen, shown_s)
             self._cameras.move(self._seen)
-            if now_s >= self._next_tell_s:
-                self._next_tell_s = now_s + (TELL_OF_MANY_S if len(self._seen) > MANY else TELL_INTERVAL_S)
-                self._tell(shown_s)
-            places_m = np.array([sighting.position_m for sighting in self._seen] + self._targets_m).reshape(-1, 3)
+            self._tell(now_s, shown_s)
+            places_m = np.concatenate((self._seen.positions_m, self._targets_m))
             tags = self._tags if len(self._tags) == len(places_m) else []
             self._browsers.update(self._seen, tags, places_m[: len(tags)])
 
-    def _tell(self, shown_s: float) -> None:
-        """Bring up to date what is read, not watched."""
-        self._desk.observe(shown_s)
+    def _tell(self, now_s: float, shown_s: float) -> None:
+        """Bring up to date what is read, not watched, if it is time to: of a large fleet a part, so that none waits."""
+        parts = (self._look_around, self._tag, *self._panels.parts)
+        if len(self._seen) > MANY and self._tags:
+            self._turn = (self._turn + 1) % len(parts)
+            parts[self._turn](self._seen, shown_s)
+        elif now_s >= self._next_tell_s:
+            self._next_tell_s = now_s + TELL_INTERVAL_S
+            for part in parts:
+                part(self._seen, shown_s)
+
+    def _look_around(self, _: Sightings, now_s: float) -> None:
+        """See what has come of vehicles, browsers, plan and map."""
+        self._desk.observe(now_s)
         self._seating.update()
         self._show_plan()
-        self._observed.update(self._desk.station.fleet.observed, shown_s)
-        self._tags = [*self._vehicle_tags(shown_s), *self._target_tags()]
-        self._panels.update(self._seen, shown_s)
+        self._observed.update(self._desk.station.fleet.observed, now_s)
+
+    def _tag(self, seen: Sightings, now_s: float) -> None:
+        """Write the name tags anew."""
+        picked, span_px = self._panels.picked_out, least_span_px(len(seen)) * VEHICLE_FLATNESS
+        brief = len(seen) > FEW
+        vehicles = [_vehicle_tag(one, now_s, span_px, selected=one.state.sysid in picked, brief=brief) for one in seen]
+        self._tags = [*vehicles, *self._target_tags()]
 
     def _is_another(self, mission: Mission | None) -> bool:
         """Whether a mission is drawn elsewise than the one that is shown; a moved origin changes nothing."""
@@ -142,17 +159,19 @@ class Page:
         scene = self._server.scene
         self._mission = self._desk.mission
         self._world: WorldScene | None = None
-        self._targets_m: list[Array] = []
+        self._targets_m = np.zeros((0, 3))
         self._size_m = self._draw_surroundings()
         self._plan = PlanScene(scene, self._size_m * POINT_SHARE)
         self._observed = ObservedScene(scene)
-        self._motion = MotionScene(scene, max(LEAST_TRAIL_SPACING_M, self._size_m * TRAIL_SPACING_SHARE))
+        spacing_m = max(LEAST_TRAIL_SPACING_M, self._size_m * TRAIL_SPACING_SHARE)
+        tolerance_m = max(spacing_m / 2, self._size_m * TRAIL_TOLERANCE_SHARE)
+        self._motion = MotionScene(scene, spacing_m, tolerance_m, self._ground_height_m)
 
     def _legend(self) -> str:
         return legend.render(self._desk.mission, self._theme, simulated=self._desk.simulated)
 
     def _greet(self, client: viser.ClientHandle) -> Browser:
-        return Browser(client, self._ground_height_m, self._pick, self._theme, self._legend())
+        return Browser(client, self._pick, self._theme, self._legend())
 
     def _use(self, theme: Theme) -> None:
         """Draw everything dark or light from now on, in all browsers."""
@@ -172,7 +191,7 @@ class Page:
         """Draw a mission that is being edited, or the one that was loaded again."""
         assert self._world is not None
         self._world.show(mission, on_pick)
-        self._targets_m = [np.array(target.position_m) for target in mission.targets]
+        self._targets_m = np.array([target.position_m for target in mission.targets]).reshape(-1, 3)
 
     def _load_draft(self, draft: Mission, client: viser.ClientHandle) -> None:
         """Ask for a draft to be loaded as if it were a file."""
@@ -185,10 +204,6 @@ class Page:
         """A vehicle was clicked; called in a thread of viser."""
         self._loop.call_soon_threadsafe(self._panels.pick, sysid, joins)
 
-    def _vehicle_tags(self, now_s: float) -> list[Tag]:
-        picked, span_px = self._panels.picked_out, least_span_px(len(self._seen)) * VEHICLE_FLATNESS
-        return [_vehicle_tag(sighting, now_s, span_px, selected=sighting.sysid in picked) for sighting in self._seen]
-
     def _target_tags(self) -> list[Tag]:
         targets = self._desk.mission.targets if self._desk.mission is not None else ()
         return [Tag(f"target {target.name}", target.name, "", TARGET, TARGET_PX, -1, "target") for target in targets]
@@ -199,7 +214,7 @@ class Page:
         if mission is None:
             self._cameras = Cameras(self._server, WATCHED_M[0], WATCHED_M[1], 1)
             return float(np.linalg.norm(WATCHED_M[1] - WATCHED_M[0]))
-        self._targets_m = [np.array(target.position_m) for target in mission.targets]
+        self._targets_m = np.array([target.position_m for target in mission.targets]).reshape(-1, 3)
         self._world = WorldScene(self._server, mission, simulated=self._desk.simulated)
         bounds, beyond_m = mission.world.bounds, mission.site.fence_margin_m * np.array([1.0, 1.0, 0.0])
         low_m, high_m = bounds.low_enu_m - beyond_m, bounds.high_enu_m + beyond_m
@@ -246,7 +261,7 @@ class Page:
     def _frame_fleet(self) -> None:
         """Without a mission, what is framed is where the vehicles are."""
         if self._world is None and self._seen:
-            places_m = np.array([sighting.position_m for sighting in self._seen])
+            places_m = self._seen.positions_m
             self._cameras.frame(places_m.min(axis=0) - AROUND_M, places_m.max(axis=0) + AROUND_M)
 
     def _follow(self, client: viser.ClientHandle) -> None:
@@ -256,18 +271,21 @@ class Page:
             self._cameras.follow(client, (chosen or self._seen)[0])
 
 
-def _vehicle_tag(sighting: Sighting, now_s: float, span_px: float, *, selected: bool) -> Tag:
-    """Name, mode, battery and height of a vehicle; those with something wrong stand out."""
-    state = sighting.state
+def _vehicle_tag(sighting: Sighting, now_s: float, span_px: float, *, selected: bool, brief: bool) -> Tag:
+    """Name, mode, battery and height of a vehicle; those with something wrong stand out, and if brief tell it alone."""
+    state, colour = sighting.state, sighting.colour
     mode, tone = words.mode_words(state, now_s)
-    battery = "" if np.isnan(state.battery_percent) else f"{state.battery_percent:.0f} %"
-    if not np.isnan(state.battery_percent) and words.battery_tone(state.battery_percent) is Tone.BAD:
+    if words.battery_tone(state.battery_percent) is Tone.BAD:
         tone = Tone.BAD
-    details = " · ".join(filter(None, (mode, battery, f"{words.number_words(sighting.position_m[2])} m")))
-    urgency = {Tone.BAD: ALARM, Tone.WARN: WARNING}.get(tone, SELECTED if selected else 0)
-    look = {Tone.BAD: "vehicle bad", Tone.WARN: "vehicle warn"}.get(tone, "vehicle")
-    key = f"vehicle {sighting.sysid}"
-    return Tag(key, sighting.name, details, sighting.colour, span_px, urgency, look, selected)
+    urgency, look = LOOKS.get(tone, (SELECTED if selected else 0, "vehicle"))
+    details = "" if brief and not urgency else _details(sighting, mode)
+    return Tag(f"vehicle {state.sysid}", sighting.name, details, colour, span_px, urgency, look, selected)
+
+
+def _details(sighting: Sighting, mode: str) -> str:
+    percent = sighting.state.battery_percent
+    battery = f"{percent:.0f} %" if math.isfinite(percent) else ""
+    return " · ".join(filter(None, (mode, battery, f"{words.number_words(sighting.position_m[2])} m")))
 
 
 def _draw_plain(scene: viser.SceneApi, theme: Theme) -> None:

@@ -15,7 +15,7 @@ from gcs.view.command_panel import CommandPanel
 from gcs.view.link_panel import LinkPanel
 from gcs.view.plots_panel import PlotsPanel
 from gcs.view.presses import Presses, visitor_key
-from gcs.view.sightings import Sighting, vehicle_colours, vehicle_names
+from gcs.view.sightings import Sightings, vehicle_colours, vehicle_names
 from gcs.view.vehicle_scene import MANY
 from missions.mission import Mission
 
@@ -89,25 +89,30 @@ class Panels:
         """Suit another mission."""
         self._commands.suit(mission)
 
-    def update(self, seen: list[Sighting], now_s: float) -> None:
-        """Bring everything up to date; viser sends only what has changed."""
+    @property
+    def parts(self) -> tuple[Callable[[Sightings, float], None], ...]:
+        """What brings each part up to date; viser sends only what has changed."""
+        return (self._show_commands, self._show_table, self._show_log, self._look_up)
+
+    def _show_commands(self, _: Sightings, now_s: float) -> None:
+        """Head, alerts and buttons."""
         desk = self._desk
         self._offer_vehicles()
         self._head.content = mission_card.render_head(desk, now_s)
         self._alerts.content = alert_list.render(desk.observations.alerts)
         self._take_command.visible = len(desk.seat.present) > 1 or desk.seat.holder is None
         self._reasons.content = mission_card.render_reasons(self._commands.update(sorted(self.selected)))
-        self._show_table(seen, now_s)
+
+    def _show_log(self, _: Sightings, now_s: float) -> None:
+        """Plots, events and orders."""
+        desk = self._desk
         self._plots.update(sorted(self.picked_out), now_s)
         names = vehicle_names(desk)
         by_name = {names[sysid]: colour for sysid, colour in vehicle_colours(names).items()}
         self._events.content = event_list.render(desk.events.events, by_name)
         self._orders.content = order_list.render(desk.orders.orders)
-        if abs(now_s - self._looked_up_s) > LOOKED_UP_INTERVAL_S:
-            self._looked_up_s = now_s
-            self._look_up(now_s)
 
-    def _show_table(self, seen: list[Sighting], now_s: float) -> None:
+    def _show_table(self, seen: Sightings, now_s: float) -> None:
         """The fleet table: a large one once a second, but at once when others are selected."""
         picked_out, aged_s = self.picked_out, abs(now_s - self._table_s)
         if len(seen) > MANY and picked_out == self._table_picked and aged_s < LOOKED_UP_INTERVAL_S:
@@ -115,9 +120,12 @@ class Panels:
         self._table_s, self._table_picked = now_s, picked_out
         self._fleet.content = fleet_table.render(fleet_table.rows(self._desk, seen, picked_out, now_s))
 
-    def _look_up(self, now_s: float) -> None:
-        """What is behind other tabs."""
+    def _look_up(self, seen: Sightings, now_s: float) -> None:
+        """What is behind other tabs, a large fleet's half as often."""
         desk = self._desk
+        if abs(now_s - self._looked_up_s) < LOOKED_UP_INTERVAL_S * (2 if len(seen) > MANY else 1):
+            return
+        self._looked_up_s = now_s
         self._links.update(now_s)
         self._readiness.content = readiness_list.render(desk, now_s)
         if desk.flight is not None:

@@ -9,8 +9,9 @@ from gcs.planner.plan import FleetPlan
 from gcs.view import shapes
 from gcs.view.colours import Rgb, vivid
 from gcs.view.theme import DARK, Theme
+from gcs.view.vehicle_scene import MANY
 
-CURVE_PX = 1.5
+CURVE_PX, CURVE_OF_MANY_PX = 1.5, 1.0
 MOST_SEGMENTS = 300
 """Per curve: enough to look smooth, and little to send."""
 
@@ -34,13 +35,13 @@ class PlanScene:
             self._theme, self._plan = theme, None
 
     def show(self, plan: FleetPlan | None, by_sysid: Mapping[int, Rgb]) -> bool:
-        """Draw a plan unless it is the one that is drawn already; whether it was new."""
+        """Draw a plan unless it is the one that is drawn already, of a large fleet the curves alone; was it new?"""
         if plan is self._plan or plan is None:
             return False
-        self._plan = plan
+        self._plan, many = plan, len(plan.vehicles) > MANY
         curves, tints, points, colours = [], [], [], []
         for part in plan.vehicles:
-            own = np.array(self._theme.line_planned(vivid(by_sysid[part.sysid])), np.uint8)
+            own = np.array(self._theme.line_planned(vivid(by_sysid[part.sysid]), many=many), np.uint8)
             step = max(1, len(part.curve_m) // MOST_SEGMENTS)
             curve = shapes.polyline(np.concatenate((part.curve_m[:-1:step], part.curve_m[-1:])))
             curves.append(curve)
@@ -48,7 +49,11 @@ class PlanScene:
             points.append(part.track.points_m)
             colours.append(np.broadcast_to(own, part.track.points_m.shape))
         self._scene.add_line_segments(
-            "/plan/curves", np.concatenate(curves), np.concatenate(tints), thickness=CURVE_PX, thickness_units="screen"
+            "/plan/curves",
+            np.concatenate(curves),
+            np.concatenate(tints),
+            thickness=CURVE_OF_MANY_PX if many else CURVE_PX,
+            thickness_units="screen",
         )
         self._scene.add_point_cloud(
             "/plan/track points",
@@ -58,5 +63,6 @@ class PlanScene:
             point_shape="circle",
             point_shading="flat",
             precision="float32",
+            visible=not many,
         )
         return True

@@ -19,6 +19,7 @@ from gcs.flight.events import Severity
 from gcs.settings import LOOPBACK
 from gcs.view.gateway import SECRET_HEADER, new_secret, open_gateway
 from gcs.view.page import Page
+from gcs.view.wakening import make_shared
 
 UPDATE_INTERVAL_S = 0.1
 POLICY_VIOLATION = 1008
@@ -75,7 +76,10 @@ def open_server(host: str, port: int, secret: str | None = None) -> viser.ViserS
         server = viser.ViserServer(host=host, port=port, verbose=False)
         sockets = server._websock_server
 
+        make_shared(sockets._broadcast_buffer.message_event)
+
         async def examine(client: WebsockClientConnection) -> None:
+            make_shared(client.get_message_buffer().message_event)
             await _refuse_strangers(sockets, client.client_id, secret)
 
         sockets.on_client_connect(examine)

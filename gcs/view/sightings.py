@@ -1,7 +1,8 @@
 """The fleet as it is drawn: who is where, in the frame of the page; pure."""
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +35,36 @@ class Sighting(NamedTuple):
         return self.state.sysid
 
 
+@dataclass(frozen=True, eq=False)
+class Sightings(Sequence[Sighting]):
+    """All vehicles that have a place, in the fleet's order: as arrays for what draws them all, and one by one.
+
+    Args:
+        positions_m: (n, 3) ENU.
+        wxyz: (n, 4) rotations of their bodies to ENU.
+    """
+
+    states: list[VehicleState] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    colours: list[Rgb] = field(default_factory=list)
+    positions_m: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    wxyz: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    sysids: list[int] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __iter__(self) -> Iterator[Sighting]:
+        return map(Sighting, self.states, self.names, self.colours, self.positions_m, self.wxyz)
+
+    @overload
+    def __getitem__(self, index: int) -> Sighting: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Sighting]: ...
+    def __getitem__(self, index: int | slice) -> Sighting | list[Sighting]:
+        return list(self)[index]
+
+
 def frame_of(desk: Desk) -> LocalFrame | None:
     """The frame of the page: that of the trails, which may have been moved, or the mission's; None if there is none."""
     if desk.trails is not None:
@@ -58,24 +89,29 @@ def vehicle_colours(sysids: Iterable[int]) -> dict[int, Rgb]:
     return {sysid: vehicle_colour(index) for index, sysid in enumerate(sysids)}
 
 
-def sightings(desk: Desk) -> list[Sighting]:
+def sightings(desk: Desk) -> Sightings:
     """All vehicles that have told where they are, in the fleet's order; none before there is a frame."""
-    frame, names = frame_of(desk), vehicle_names(desk)
-    colours = vehicle_colours(names)
-    vehicles = desk.vehicles
-    placed = [(state, state.place) for sysid in names if (state := vehicles.get(sysid)) is not None]
-    seen = [(state, place) for state, place in placed if place is not None]
-    if frame is None or not seen:
-        return []
+    frame, names, vehicles = frame_of(desk), vehicle_names(desk), desk.vehicles
+    sysids = [sysid for sysid in names if sysid in vehicles and vehicles[sysid].place is not None]
+    if frame is None or not sysids:
+        return Sightings()
+    states = [vehicles[sysid] for sysid in sysids]
     parts = desk.flight.vehicles if desk.flight is not None else {}
-    offsets_m = np.array([_ground_offset_m(parts.get(state.sysid)) for state, _ in seen])
-    geodetic = np.array([(p.latitude_deg, p.longitude_deg, p.altitude_amsl_m) for _, p in seen]).T
-    positions_m = frame.enu(geodetic[0], geodetic[1], geodetic[2] - offsets_m)
-    rotations = quaternion_enu_from_flu(np.array([state.attitude_wxyz for state, _ in seen]))
-    return [
-        Sighting(state, names[state.sysid], colours[state.sysid], position_m, wxyz)
-        for (state, _), position_m, wxyz in zip(seen, positions_m, rotations, strict=True)
-    ]
+    places = [state.place for state in states if state.place is not None]
+    positions_m = frame.enu(
+        [place.latitude_deg for place in places],
+        [place.longitude_deg for place in places],
+        [p.altitude_amsl_m - _ground_offset_m(parts.get(sysid)) for p, sysid in zip(places, sysids, strict=True)],
+    )
+    colours = vehicle_colours(names)
+    return Sightings(
+        states,
+        [names[sysid] for sysid in sysids],
+        [colours[sysid] for sysid in sysids],
+        positions_m,
+        quaternion_enu_from_flu(np.array([state.attitude_wxyz for state in states])),
+        sysids,
+    )
 
 
 def _ground_offset_m(part: VehicleFlight | None) -> float:

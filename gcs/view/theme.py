@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from gcs.view.colours import Rgb, faded
 
 AHEAD_SHARE, BEHIND_SHARE, PLANNED_SHARE = 0.2, 0.2, 0.35
-"""How far the lines of a vehicle are from its own colour."""
+"""How far the lines of a vehicle are from its own colour ..."""
+BEHIND_SHARE_OF_MANY, PLANNED_SHARE_OF_MANY = 0.45, 0.8
+"""... and in a large fleet, where they would hide everything."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +44,13 @@ class Theme:
         """Of what a vehicle of this colour flies next."""
         return faded(vehicle, self.ahead, AHEAD_SHARE)
 
-    def line_behind(self, vehicle: Rgb) -> Rgb:
-        """Of what it has flown."""
-        return faded(vehicle, self.shade, BEHIND_SHARE)
+    def line_behind(self, vehicle: Rgb, *, many: bool) -> Rgb:
+        """Of what it has flown, as one of many or of a few."""
+        return faded(vehicle, self.shade, BEHIND_SHARE_OF_MANY if many else BEHIND_SHARE)
 
-    def line_planned(self, vehicle: Rgb) -> Rgb:
-        """Of what the cloud has planned for it."""
-        return faded(vehicle, self.shade, PLANNED_SHARE)
+    def line_planned(self, vehicle: Rgb, *, many: bool) -> Rgb:
+        """Of what the cloud has planned for it, as one of many or of a few."""
+        return faded(vehicle, self.shade, PLANNED_SHARE_OF_MANY if many else PLANNED_SHARE)
 
 
 DARK = Theme(

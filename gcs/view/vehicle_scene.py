@@ -1,6 +1,6 @@
-"""The fleet as one browser is shown it: quadrotors, and the stems that show where above the ground they are."""
+"""The fleet as one browser is shown it: quadrotors, as large as its camera needs them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -8,12 +8,10 @@ import viser
 
 from gcs.view import colours, shapes
 from gcs.view.labels import Lens
-from gcs.view.sightings import Sighting
+from gcs.view.sightings import Sightings
 from gcs.view.theme import DARK, Theme
 
 Array = npt.NDArray[np.float64]
-GroundHeight = Callable[[Array], Array]
-"""(n,) height of the ground [m] below (n, 2) places."""
 Pick = Callable[[int, bool], None]
 """Called with the system id of the vehicle that was clicked, and whether it joins those that are selected."""
 
@@ -40,64 +38,57 @@ def spans_m(positions_m: Array, lens: Lens | None) -> Array:
 
 
 class VehicleScene:
-    """All vehicles, as a few batched nodes.
+    """All vehicles, as a few batched nodes; those of a large fleet, which are small, as one.
 
     Args:
         scene: of the page, or of one browser.
-        ground_height_m: the height of the ground below (n, 2) places.
         on_pick: see `Pick`; in a thread of viser.
         theme: dark or light.
     """
 
-    def __init__(
-        self, scene: viser.SceneApi, ground_height_m: GroundHeight, on_pick: Pick | None = None, theme: Theme = DARK
-    ) -> None:
-        self._scene, self._ground_height_m, self._on_pick, self._theme = scene, ground_height_m, on_pick, theme
+    def __init__(self, scene: viser.SceneApi, on_pick: Pick | None = None, theme: Theme = DARK) -> None:
+        self._scene, self._on_pick, self._theme = scene, on_pick, theme
         self._drawn: list[int] = []
         self._sizes_m = np.zeros(0)
         self._batches: list[viser.BatchedMeshHandle] = []
-        self._stems: viser.LineSegmentsHandle | None = None
 
     def use(self, theme: Theme) -> None:
         """Draw the vehicles dark or light from now on."""
         self._theme, self._drawn = theme, []
 
-    def move(self, seen: Sequence[Sighting], lens: Lens | None) -> None:
+    def move(self, seen: Sightings, lens: Lens | None) -> None:
         """Bring every vehicle to where it is now."""
         if not seen:
             return
-        positions_m = np.array([sighting.position_m for sighting in seen])
-        rotations = np.array([sighting.wxyz for sighting in seen])
-        sizes_m = spans_m(positions_m, lens)
-        if [sighting.sysid for sighting in seen] != self._drawn:
-            self._build(seen, positions_m, rotations, sizes_m)
-        places, turns, sizes = (values.astype(np.float32) for values in (positions_m, rotations, sizes_m))
+        sizes_m = spans_m(seen.positions_m, lens)
+        if seen.sysids != self._drawn:
+            self._build(seen, sizes_m)
+        places, turns = seen.positions_m.astype(np.float32), seen.wxyz.astype(np.float32)
         resized, self._sizes_m = not np.array_equal(sizes_m, self._sizes_m), sizes_m
         for batch in self._batches:
             batch.batched_positions = places
             batch.batched_wxyzs = turns
             if resized:
-                batch.batched_scales = sizes
-        assert self._stems is not None
-        self._stems.points = self._stem_lines(positions_m).astype(np.float32)
+                batch.batched_scales = sizes_m.astype(np.float32)
 
-    def _build(self, seen: Sequence[Sighting], positions_m: Array, rotations: Array, sizes_m: Array) -> None:
-        self._drawn, self._sizes_m = [sighting.sysid for sighting in seen], sizes_m
-        own = np.array([colours.vivid(sighting.colour) for sighting in seen], dtype=np.uint8)
-        grey = np.tile(np.array(self._theme.airframe, np.uint8), (len(seen), 1))
+    def _build(self, seen: Sightings, sizes_m: Array) -> None:
+        for batch in self._batches:
+            batch.remove()
+        self._drawn, self._sizes_m = seen.sysids, sizes_m
+        own = np.array([colours.vivid(colour) for colour in seen.colours], dtype=np.uint8)
         quadrotor = shapes.quadrotor()
-        self._batches = [
-            self._batch("hull", quadrotor.hull, own, positions_m, rotations, sizes_m),
-            self._batch("airframe", quadrotor.airframe, grey, positions_m, rotations, sizes_m),
-            self._batch("rotors", quadrotor.rotors, own, positions_m, rotations, sizes_m, opacity=0.45),
-        ]
+        if len(seen) > MANY:
+            self._batches = [self._batch("hull", shapes.merged(quadrotor), own, seen, sizes_m)]
+        else:
+            grey = np.tile(np.array(self._theme.airframe, np.uint8), (len(seen), 1))
+            self._batches = [
+                self._batch("hull", quadrotor.hull, own, seen, sizes_m),
+                self._batch("airframe", quadrotor.airframe, grey, seen, sizes_m),
+                self._batch("rotors", quadrotor.rotors, own, seen, sizes_m, opacity=0.45),
+            ]
         for batch in self._batches if self._on_pick is not None else ():
             batch.on_click(lambda event: self._clicked(event.instance_index, joins=False))
             batch.on_click(modifier="shift")(lambda event: self._clicked(event.instance_index, joins=True))
-        tints = np.repeat(own[:, None], 2, axis=1)
-        self._stems = self._scene.add_line_segments(
-            "/fleet/stems", self._stem_lines(positions_m), tints, thickness=1.0, thickness_units="screen"
-        )
 
     def _clicked(self, index: int | None, *, joins: bool) -> None:
         drawn = self._drawn
@@ -109,8 +100,7 @@ class VehicleScene:
         name: str,
         mesh: shapes.Mesh,
         tints: npt.NDArray[np.uint8],
-        positions_m: Array,
-        rotations: Array,
+        seen: Sightings,
         sizes_m: Array,
         opacity: float | None = None,
     ) -> viser.BatchedMeshHandle:
@@ -118,8 +108,8 @@ class VehicleScene:
             f"/fleet/{name}",
             mesh.vertices,
             mesh.faces,
-            rotations,
-            positions_m,
+            seen.wxyz,
+            seen.positions_m,
             batched_scales=sizes_m,
             batched_colors=tints,
             opacity=opacity,
@@ -127,7 +117,3 @@ class VehicleScene:
             side="double",
             lod="off",
         )
-
-    def _stem_lines(self, positions_m: Array) -> Array:
-        feet = np.column_stack((positions_m[:, :2], self._ground_height_m(positions_m[:, :2])))
-        return np.stack((feet, positions_m), axis=1)

@@ -16,6 +16,8 @@ from tests.browser.scripted_desk import ScriptedDesk
 
 SMALL, LARGE = (960, 640), (1360, 800)
 """Windows: what is drawn in software is better small, what is looked at better large."""
+COARSE, FINE = 0.5, 1.0
+"""Pixels of the scene per pixel of the window: a scene that nobody looks at takes a quarter of the time."""
 
 
 expect.set_options(timeout=PATIENCE_S * 1000)
@@ -24,7 +26,9 @@ expect.set_options(timeout=PATIENCE_S * 1000)
 class OpenPage(Protocol):
     """Serves a scripted desk's page and shows it in a tab."""
 
-    def __call__(self, scripted: ScriptedDesk, window: tuple[int, int] = SMALL) -> Awaitable[Page]: ...
+    def __call__(
+        self, scripted: ScriptedDesk, window: tuple[int, int] = SMALL, pixels: float = COARSE
+    ) -> Awaitable[Page]: ...
 
 
 @pytest_asyncio.fixture(loop_scope="module", scope="module")
@@ -44,9 +48,9 @@ async def open_page(browser: Browser) -> AsyncIterator[OpenPage]:
     """Errors in the page, and errors in serving it, fail the test."""
     async with AsyncExitStack() as stack:
 
-        async def show(scripted: ScriptedDesk, window: tuple[int, int] = SMALL) -> Page:
+        async def show(scripted: ScriptedDesk, window: tuple[int, int] = SMALL, pixels: float = COARSE) -> Page:
             port = await stack.enter_async_context(serving(scripted))
-            return await stack.enter_async_context(tab(browser, port, window))
+            return await stack.enter_async_context(tab(browser, port, window, pixels))
 
         yield show
 
@@ -71,14 +75,16 @@ async def serving(scripted: ScriptedDesk, token: str | None = None) -> AsyncIter
 
 
 @asynccontextmanager
-async def tab(browser: Browser, port: int, window: tuple[int, int] = SMALL, query: str = "") -> AsyncIterator[Page]:
+async def tab(
+    browser: Browser, port: int, window: tuple[int, int] = SMALL, pixels: float = COARSE, query: str = ""
+) -> AsyncIterator[Page]:
     """A tab that shows the page on a port, once its panels are there."""
     page = await browser.new_page(viewport={"width": window[0], "height": window[1]})
     page.set_default_timeout(PATIENCE_S * 1000)
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     try:
-        await page.goto(f"http://{HOST}:{port}/{query}")
+        await page.goto(f"http://{HOST}:{port}/?fixedDpr={pixels}{query}")
         await page.wait_for_selector(".gcs-fleet")
         yield page
         assert errors == [], "the page raised errors"

@@ -7,8 +7,10 @@ from pathlib import Path
 from PIL import Image
 from playwright.async_api import Browser, FloatRect, async_playwright
 
+from missions.mission import Mission
 from tests.browser.chromium import ARGUMENTS, find_chromium
-from tests.browser.conftest import LARGE, serving, tab
+from tests.browser.conftest import FINE, LARGE, serving, tab
+from tests.browser.large_fleet import large_fleet
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
 from tests.browser.watching import button
@@ -18,6 +20,7 @@ PICTURES = (
     ("page.jpg", "indoor", 0.45, False),
     ("page-terrain.jpg", "terrain-2-5uav", 0.5, False),
     ("page-light.jpg", "fleet-10", 0.4, True),
+    ("page-fleet.jpg", large_fleet(), 0.45, False),
 )
 """File, mission, how much of the plan has been flown, and whether the page is light."""
 SETTLE_MS = 3000
@@ -28,11 +31,11 @@ SCENE_PX = FloatRect(x=340, y=0, width=1020, height=645)
 STEP_S = 0.05
 
 
-async def picture(browser: Browser, file: str, mission: str, share: float, *, light: bool) -> None:
+async def picture(browser: Browser, file: str, mission: Mission | str, share: float, *, light: bool) -> None:
     """Draw one of them."""
     scripted = ScriptedDesk(mission)
     await scripted.begin(at_s=[share * part.times_s[-1] for part in scripted_plan(scripted.mission).vehicles])
-    async with serving(scripted) as port, tab(browser, port, LARGE) as page:
+    async with serving(scripted) as port, tab(browser, port, LARGE, FINE) as page:
         await page.wait_for_function("window.__viserTestpoints?.rendererInfo.render.triangles > 500")
         await page.wait_for_timeout(SETTLE_MS)
         await page.locator(".mantine-Notification-closeButton").first.click()
@@ -48,7 +51,7 @@ async def animation(browser: Browser) -> None:
     scripted, frames = ScriptedDesk("indoor"), list[Image.Image]()
     scripted.pace = 0.0
     await scripted.begin(at_s=[STEP_S, STEP_S])
-    async with serving(scripted) as port, tab(browser, port, LARGE) as page:
+    async with serving(scripted) as port, tab(browser, port, LARGE, FINE) as page:
         await page.wait_for_timeout(2 * SETTLE_MS)
         await page.locator(".mantine-Notification-closeButton").first.click()
         for _ in range(FRAMES):

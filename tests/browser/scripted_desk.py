@@ -173,7 +173,7 @@ class ScriptedDesk:
     """A desk and the vehicles that it looks at.
 
     Args:
-        mission: its name, or None for watching `watched` vehicles without a mission.
+        mission: it, its name, or None for watching `watched` vehicles without a mission.
         watched: see there.
 
     Attributes:
@@ -181,14 +181,14 @@ class ScriptedDesk:
             begin; 0 if what is tested depends on where the vehicles are.
     """
 
-    def __init__(self, mission: str | None, watched: int = 0) -> None:
+    def __init__(self, mission: Mission | str | None, watched: int = 0) -> None:
         self.planning_s, self.pace = 0.0, 0.1
         self.air = Air()
         self.events = EventLog(time.monotonic)
         self.desk = Desk(self.air.station, self.events, simulated=True)
         frame, pads_m = load_mission("field").frame, [(4.0 * i, 2.0 * i, 0.0) for i in range(watched)]
         if mission is not None:
-            self.mission = load_mission(mission)
+            self.mission = load_mission(mission) if isinstance(mission, str) else mission
             self.desk.flight = self._flight(self.mission)
             frame, pads_m = self.mission.frame, [vehicle.pad_m for vehicle in self.mission.vehicles]
         self.desk.trails = Trails(frame)

@@ -1,14 +1,15 @@
-"""The paper's flight on the page: the real programs, a real browser, and somebody who only watches."""
+"""Flights on the page: the real programs, a real browser, and somebody who watches, from the start or from midway."""
 
+import signal
 from pathlib import Path
 
 import pytest
 from playwright.async_api import Browser, expect
 
 from tests.browser.conftest import LARGE, tab
-from tests.browser.ground_station import gcs_fly
+from tests.browser.ground_station import gcs_fly, program
 from tests.browser.loopback import answering, free_port
-from tests.browser.watching import OUT, row, scene
+from tests.browser.watching import OUT, button, row, scene
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
 
@@ -36,3 +37,26 @@ async def test_the_indoor_mission_is_flown_before_the_operators_eyes(browser: Br
             assert process.returncode is None, "the page goes on after the flight"
     assert process.returncode is not None
     assert (tmp_path / "report.json").exists()
+
+
+async def test_a_flight_whose_ground_station_is_gone_is_watched_by_another_one(browser: Browser, tmp_path: Path):
+    """The operator presses Fly; in mid-flight that ground station is killed, and another one shows what goes on."""
+    ports, base = (free_port(), free_port()), ["--instance-base", str(INSTANCE_BASE + 10)]
+    options = ["--mode", "cloud", "--port", str(ports[0]), *base, "--report", str(tmp_path)]
+    async with program("sitl", "indoor", *base):
+        async with gcs_fly("indoor", *options) as process:
+            await answering(ports[0])
+            async with tab(browser, ports[0]) as page:
+                await expect(button(page, "Fly")).to_be_enabled()
+                await button(page, "Fly").click()
+                await expect(page.locator(".gcs-head .phase")).to_have_text("Flying", timeout=FLIGHT_TIMEOUT_MS)
+                process.send_signal(signal.SIGKILL)
+                await process.wait()
+        async with program("gcs", "watch", "--flight", str(tmp_path), "--port", str(ports[1]), *base):
+            await answering(ports[1])
+            async with tab(browser, ports[1]) as page:
+                await expect(page.locator(".gcs-head h1")).to_have_text("indoor")
+                await expect(row(page, "flying")).to_have_count(2)
+                await expect(row(page, "Mission")).to_have_count(2)
+                await expect(page.locator(".gcs-overlay .tag.vehicle").first).to_be_visible()
+                assert {"/plan/curves", "/fleet/hull", "/fleet/tails"} <= await scene(page)

@@ -240,7 +240,7 @@ async def test_without_the_token_there_is_no_page(browser: Browser):
         await expect(page.locator(".gcs-fleet")).to_have_count(0)
         await page.screenshot(path=OUT / "operator-door.png")
         await page.close()
-        async with tab(browser, port, query="?token=correct%20horse") as inside:
+        async with tab(browser, port, query="&token=correct%20horse") as inside:
             assert "token" not in inside.url
             await press(inside, "Hold")
             await until(lambda: all(vehicle.mode is Mode.HOLD for vehicle in scripted.vehicles), "both hold")

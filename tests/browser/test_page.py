@@ -9,7 +9,7 @@ from playwright.async_api import expect
 from gcs.dialect import Mode, mavlink
 from gcs.flight.events import Severity
 from gcs.flight.monitor import Phase
-from tests.browser.conftest import LARGE, OpenPage
+from tests.browser.conftest import FINE, LARGE, OpenPage
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
 from tests.browser.watching import OUT, button, camera_position_m, pixels, row, scene, until
@@ -172,7 +172,7 @@ async def test_cameras_see_the_whole_world_look_from_above_and_follow(open_page:
     ],
 )
 async def test_every_world_is_drawn(open_page: OpenPage, mission: str, vehicles: int):
-    page = await open_page(await flying(mission), LARGE)
+    page = await open_page(await flying(mission), LARGE, FINE)
     await expect(page.locator(".gcs-fleet tbody tr")).to_have_count(vehicles)
     await page.wait_for_function("window.__viserTestpoints?.rendererInfo.render.triangles > 500")
     await page.wait_for_timeout(4000)  # for the tags' letters

@@ -13,7 +13,7 @@ from tests.browser.conftest import OpenPage, serving, tab
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
 from tests.browser.toy_player import ToyPlayer
-from tests.browser.watching import OUT, button, camera_position_m, shows, until
+from tests.browser.watching import OUT, button, camera_position_m, pixel_of, shows, until
 
 pytestmark = pytest.mark.browser
 
@@ -27,6 +27,12 @@ async def test_two_browsers_have_a_camera_each_and_share_everything_else(browser
             await expect(page.locator(".gcs-overlay .tag", has_text="alpha")).to_contain_text("Offboard · 96 %")
             for node in ("/fleet/hull", "/fleet/tails", "/world/fence"):
                 await shows(page, node)
+        for vehicle, name in zip(scripted.vehicles, ("alpha", "bravo"), strict=True):
+            box = await one.locator(".gcs-overlay .tag", has_text=name).bounding_box()
+            assert box is not None
+            at = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+            away = at - await pixel_of(one, vehicle.position_m)
+            assert np.all(np.abs(away) < [100.0, 60.0]), "a tag stands by its vehicle, however coarsely that is drawn"
         before_m = await camera_position_m(other)
         await button(one, "Top").click()
         await one.wait_for_timeout(1500)
@@ -63,8 +69,9 @@ async def test_a_recording_is_played_and_moved_through(open_page: OpenPage):
     await expect(page.locator(".gcs-replay")).to_contain_text("00:00.0 of 01:00.0")
     await button(page, "Play").click()
     await until(lambda: player.playing, "it plays")
-    await button(page, "+ 10 s").click()
-    await expect(page.locator(".gcs-replay")).to_contain_text("00:10.0 of 01:00.0")
+    for name, then in (("+ 10 s", "00:10.0"), ("+ 10 s", "00:20.0"), ("− 10 s", "00:10.0")):
+        await button(page, name).click()
+        await expect(page.locator(".gcs-replay")).to_contain_text(f"{then} of 01:00.0")
     await page.get_by_text("5×", exact=True).click()
     await until(lambda: player.speed == 5.0, "it is faster")
     await button(page, "Pause").click()

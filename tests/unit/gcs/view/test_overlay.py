@@ -26,7 +26,7 @@ def test_a_tag_names_its_vehicle_in_its_colour_and_stands_above_it():
     html = Overlay().render([tag("alpha")], np.zeros((1, 3)), LENS)
     assert "<b>alpha</b><span>Offboard · 90 %</span>" in html
     assert "--own:#0ac81e" in html
-    found = re.search(r'class="tag vehicle" style="left:(\d+)px;top:(\d+)px', html)
+    found = re.search(r'class="tag vehicle" style="--x:(\d+);--y:(\d+)', html)
     assert found is not None
     assert int(found[1]) == 500
     assert int(found[2]) == pytest.approx(400 - 31, abs=1)
@@ -48,7 +48,7 @@ def test_in_a_large_fleet_only_those_that_want_attention_tell_more_than_their_na
 def test_a_vehicle_out_of_the_picture_has_an_arrow_at_the_edge_towards_it():
     html = Overlay().render([tag("alpha")], np.array([[100.0, 0.0, 0.0]]), LENS)
     assert 'class="tag' not in html
-    found = re.search(r'class="out" style="left:(\d+)px;top:(\d+)px;color:#0ac81e;--turn:(-?\d+)deg', html)
+    found = re.search(r'class="out" style="--x:(\d+);--y:(\d+);color:#0ac81e;--turn:(-?\d+)deg', html)
     assert found is not None
     assert int(found[1]) > 950
     assert int(found[2]) == pytest.approx(400, abs=2)
@@ -67,7 +67,7 @@ def test_tags_go_along_with_their_vehicles_and_do_not_tremble():
     tags = [tag("alpha"), tag("bravo")]
 
     def stands(html: str) -> list[tuple[int, int]]:
-        return [(int(x), int(y)) for x, y in re.findall(r'class="tag vehicle" style="left:(\d+)px;top:(\d+)px', html)]
+        return [(int(x), int(y)) for x, y in re.findall(r'class="tag vehicle" style="--x:(\d+);--y:(\d+)', html)]
 
     first = stands(overlay.render(tags, places_m, LENS))
     for step in range(1, 8):
@@ -85,7 +85,7 @@ def test_the_needle_points_north():
 
 def test_the_scale_bar_is_a_round_length():
     html = Overlay().render([], np.zeros((0, 3)), LENS)
-    assert 'class="scale" style="width:80px">2 m' in html
+    assert 'class="scale" style="--long:80">2 m' in html
 
 
 @pytest.mark.parametrize(("length_m", "words"), [(500.0, "500 m"), (2000.0, "2 km"), (0.5, "50 cm"), (0.002, "2 mm")])

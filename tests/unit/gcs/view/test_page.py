@@ -15,6 +15,7 @@ from gcs.view import page as page_module
 from gcs.view.lines import AHEAD, CHUNK
 from gcs.view.page import Page
 from gcs.view.server import close_server, open_server
+from gcs.view.wakening import SharedEvent
 from missions.tunnel import CompanionState
 from tests.browser.loopback import HOST, free_port
 from tests.browser.raw_client import raw_client
@@ -207,3 +208,10 @@ async def test_what_autopilots_say_is_taken_into_the_log_once(server: viser.Vise
         ("bravo", "Low battery", Severity.WARNING),
         ("bravo", "Failsafe activated", Severity.ERROR),
     ]
+
+
+async def test_whoever_waits_for_messages_is_woken_by_visers_own_thread(
+    server: viser.ViserServer, browser: viser.ClientHandle
+):
+    for handler in (server._websock_server, browser._websock_connection):
+        assert isinstance(handler.get_message_buffer().message_event, SharedEvent)

@@ -37,7 +37,7 @@ async def test_without_a_mission_nothing_is_drawn_before_there_is_a_frame():
     desk = await make_desk(None, heard=(4,))
     home = GeodeticPoint(latitude_deg=47.0, longitude_deg=8.0, altitude_amsl_m=400.0)
     desk.vehicles[4].place = home
-    assert sightings(desk) == []
+    assert len(sightings(desk)) == 0
     desk.trails = Trails(LocalFrame(home))
     (vehicle,) = sightings(desk)
     assert vehicle.name == "vehicle 4"
