@@ -2,10 +2,8 @@
 
 import msgspec
 import numpy as np
-import pytest
 
 from gcs.dialect import Mode
-from gcs.flight.report import min_clearance_m
 from missions import obstacles
 from missions.mission import Target, load_mission
 from tests.simulation.whole_system import WholeSystem
@@ -32,20 +30,3 @@ def test_one_vehicle_climbs_out_over_the_terrain_and_holds_at_its_target():
     noise_m_s = 3.0 * TERRAIN.simulation.positioning.velocity_std_m_s  # it flies by its estimate, not by the truth
     assert np.linalg.norm(moved.velocities_m_s, axis=1).max() <= TERRAIN.limits.cruise_speed_m_s + noise_m_s
     assert obstacles.clearance(moved.positions_m, obstacles.pack(TERRAIN.world)).min() > 0.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["terrain-1-5uav", "terrain-1-10uav"])
-def test_a_fleet_flies_all_of_the_way_over_the_terrain(name: str):
-    mission = load_mission(name)
-    system = WholeSystem(mission)
-    report = system.fly()
-    assert report.success, report.reason
-    assert not system.simulator.collisions
-    assert report.min_separation_m is not None
-    assert report.min_separation_m >= 0.9 * mission.limits.separation_m
-    for vehicle in report.vehicles:
-        assert vehicle.target_error_m <= mission.site.arrival_tolerance_m
-        assert vehicle.offboard_losses == 0
-    for flown in system.flown().values():
-        assert min_clearance_m(mission, flown.in_flight()) > mission.limits.body_radius_m
