@@ -50,6 +50,8 @@ class LinkConditions(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """How many of them arrive twice."""
     reorder: Share = 0.0
     """How many of them are overtaken by those behind."""
+    corruption: Share = 0.0
+    """How many of them arrive with one byte changed."""
     bandwidth_bytes_s: NotNegative = 0.0
     """Each way; 0 is no limit. What would have to wait for more than a second is lost."""
 
@@ -129,7 +131,15 @@ class Reboot(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     at_s: NotNegative | None = None
 
 
-SimulatorFault = LinkFault | GpsLoss | MotorFailure | BatteryLevel | SensorNoise | Weather | Reboot
+class ClockJump(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag="clock-jump"):
+    """What an autopilot takes for UTC jumps, as when GPS has its time at last; its time since boot does not."""
+
+    vehicle: SystemId
+    by_s: Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+    at_s: NotNegative | None = None
+
+
+SimulatorFault = LinkFault | GpsLoss | MotorFailure | BatteryLevel | SensorNoise | Weather | Reboot | ClockJump
 
 SIMULATOR_EXAMPLES = (
     "link:vehicle=1,link=ground,loss=0.3,delay_s=0.1",

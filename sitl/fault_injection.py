@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from missions.errors import MissionError
 from missions.faults import (
     BatteryLevel,
+    ClockJump,
     GpsLoss,
     LinkFault,
     MotorFailure,
@@ -32,12 +33,14 @@ class Breakable:
         links: its two links.
         charge: its battery's.
         reboot: boots its autopilot anew.
+        set_clock: moves its UTC by so many seconds.
     """
 
     index: int
     links: Mapping[Link, FaultyLink]
     charge: Charge
     reboot: Callable[[], None]
+    set_clock: Callable[[float], None]
 
 
 class FaultInjector:
@@ -108,6 +111,8 @@ class FaultInjector:
                 self._fleet.set_weather((fault.east_m_s, fault.north_m_s, fault.up_m_s), fault.gust_std_m_s)
             case Reboot():
                 self._vehicles[fault.vehicle].reboot()
+            case ClockJump():
+                self._vehicles[fault.vehicle].set_clock(fault.by_s)
 
     def _break_links(self, fault: LinkFault, now_s: float) -> None:
         black_until_s = now_s + fault.blackout_s

@@ -292,6 +292,7 @@ class Simulator:
             links=self._links[sysid],
             charge=self._memories[sysid].charge,
             reboot=lambda: self._reboot(sysid),
+            set_clock=lambda by_s: self.vehicles[sysid].set_clock(by_s),
         )
 
     # ------------------------------------------------------------- collisions

@@ -160,6 +160,10 @@ class Vehicle:
         """Frames that could not be read, or were not signed as they must be, on both links."""
         return self._signing.refused + sum(reader.dropped for reader in self._readers.values())
 
+    def set_clock(self, by_s: float) -> None:
+        """UTC, as the autopilot has it, jumps; time since boot goes on."""
+        self._utc_start_us += round(by_s * 1e6)
+
     # ---------------------------------------------------------------- traffic
     def receive(self, link: Link, datagram: bytes) -> None:
         """Take in one datagram; never raises because of what is in it."""

@@ -1,4 +1,4 @@
-"""The faults of a link, both ways: loss, delay, jitter, copies, order, bandwidth, blackouts; sans-IO, seeded."""
+"""The faults of a link, both ways: loss, delay, jitter, copies, order, wrong bytes, bandwidth, blackouts; sans-IO."""
 
 import heapq
 import itertools
@@ -78,6 +78,8 @@ class FaultyLink:
         if departure_s is None or self._is_black(now_s, since_takeoff_s) or self._happens(c.loss):
             self.lost += 1
             return
+        if self._happens(c.corruption):
+            datagram = self._corrupted(datagram)
         arrival_s = departure_s + c.delay_s
         if c.jitter_s > 0.0:
             arrival_s += c.jitter_s * self._rng.random()
@@ -110,6 +112,14 @@ class FaultyLink:
             return None
         self._free_s[way] = begin_s + n_bytes / self._conditions.bandwidth_bytes_s
         return self._free_s[way]
+
+    def _corrupted(self, datagram: bytes) -> bytes:
+        """The datagram with one byte changed; an empty one stays what it is."""
+        if not datagram:
+            return datagram
+        changed = bytearray(datagram)
+        changed[int(self._rng.integers(len(changed)))] ^= int(self._rng.integers(1, 256))
+        return bytes(changed)
 
     def _happens(self, share: float) -> bool:
         return share > 0.0 and bool(self._rng.random() < share)

@@ -6,6 +6,7 @@ import pytest
 
 from gcs.settings import PlanningMode
 from missions.mission import LinkSettings, Mission, load_mission
+from missions.world import World
 from tests.simulation.whole_system import WholeSystem
 
 INDOOR = load_mission("indoor")
@@ -31,6 +32,15 @@ def test_both_drones_cross_the_room_and_land_at_their_targets(seed: int):
         assert vehicle.link.lost == 0
     assert report.min_separation_m is not None
     assert report.min_separation_m > 0.6
+
+
+def test_autopilots_that_overshoot_the_speed_that_they_are_ordered_keep_the_missions_limit():
+    """Along a straight way that is long enough to get up to speed; ordered all of the limit, they flew 3.1 m/s."""
+    system = fly_by_cloud(msgspec.structs.replace(INDOOR, world=World(bounds=INDOOR.world.bounds)))
+    system.fly()
+    for flown in system.flown().values():
+        fastest_m_s = np.linalg.norm(flown.velocities_m_s, axis=1).max()
+        assert 0.9 * INDOOR.limits.cruise_speed_m_s < fastest_m_s <= INDOOR.limits.cruise_speed_m_s
 
 
 def test_one_seed_is_one_flight_to_the_bit():

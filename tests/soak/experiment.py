@@ -11,12 +11,18 @@ from gcs.flight.report import FlightReport
 from tests.simulation.whole_system import WholeSystem
 from tests.soak.invariants import violations
 from tests.soak.scenario import Scenario, draw
+from tests.soak.troubled_system import TroubledSystem
 
 
-def fly(scenario: Scenario, seed: int) -> tuple[WholeSystem, FlightReport, Row]:
+def fly(scenario: Scenario, seed: int) -> tuple[TroubledSystem, FlightReport, Row]:
     """One flight, its report, and its row."""
-    system = WholeSystem(
-        scenario.mission, scenario.mode, seed=seed, faults=scenario.companion_faults, truth_mission=scenario.truth
+    system = TroubledSystem(
+        scenario.mission,
+        scenario.mode,
+        seed=seed,
+        faults=scenario.companion_faults,
+        truth_mission=scenario.truth,
+        mishaps=scenario.mishaps,
     )
     report = system.fly()
     broken = violations(scenario, system, report)

@@ -1,4 +1,4 @@
-"""What goes wrong in the flight of a seed: links, faults of vehicles and companions, weather, an unmapped pillar."""
+"""What goes wrong in the flight of a seed: links, vehicles, companions, the ground station, weather, a wrong map."""
 
 import functools
 from collections.abc import Callable
@@ -8,9 +8,11 @@ from typing import TypeVar
 import msgspec
 import numpy as np
 
+from gcs.flight.monitor import Phase
 from gcs.settings import PlanningMode
 from missions.faults import (
     BatteryLevel,
+    ClockJump,
     CompanionHang,
     CompanionKill,
     Fault,
@@ -25,12 +27,17 @@ from missions.faults import (
 )
 from missions.mission import Blackout, LinkSettings, Mission, contradictions, load_mission
 from missions.world import Cylinder
+from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, LidarSilence, Mishap, Timed, WallClockJump
 
 T = TypeVar("T")
 Rng = np.random.Generator
 
 LOSSES = (0.0, 0.0, 0.02, 0.1, 0.3, 0.5)
-DELAYS_S = (0.0, 0.05, 0.3, 1.0, 2.0)
+DELAYS_S = (0.0, 0.0, 0.05, 0.05, 0.3, 0.3, 1.0, 2.0)
+"""Long ones are rare: an upload takes minutes on them, with everybody on the ground."""
+CORRUPTIONS = (0.0, 0.0, 0.01, 0.1)
+FLEETS = (2,) * 12 + (3, 4)
+"""How many fly."""
 BLACKOUTS_S = (1.0, 10.0, 60.0)
 MOST_FAULTS = 2
 FLIGHT_S = 18.0
@@ -46,12 +53,14 @@ class Scenario:
         mission: what everybody reads.
         truth: what the simulator flies in.
         companion_faults: what ends companions.
+        mishaps: what else goes wrong.
     """
 
     mode: PlanningMode
     mission: Mission
     truth: Mission
     companion_faults: tuple[Fault, ...]
+    mishaps: tuple[Mishap, ...]
 
     @property
     def faults(self) -> tuple[Fault | SimulatorFault, ...]:
@@ -60,24 +69,29 @@ class Scenario:
     @property
     def story(self) -> str:
         """What goes wrong, in one line."""
-        links = {kind: getattr(self.truth.simulation, f"{kind}_link") for kind in ("ground", "onboard", "fleet")}
+        simulated = self.truth.simulation
+        links = {"ground": simulated.ground_link, "onboard-link": simulated.onboard_link, "fleet": simulated.fleet_link}
         disturbed = [f"{kind} {_named(link)}" for kind, link in links.items() if link != LinkSettings()]
         unmapped = [thing.name for thing in self.truth.world.cylinders if not thing.known]
-        return "; ".join([self.mode.value, *disturbed, *unmapped, *(_named(fault) for fault in self.faults)])
+        fleet = [f"fleet-of {len(self.mission.vehicles)}"] if len(self.mission.vehicles) > 2 else []
+        told = [_named(trouble) for trouble in (*self.faults, *self.mishaps)]
+        return "; ".join([self.mode.value, *fleet, *disturbed, *unmapped, *told])
 
 
 def draw(seed: int) -> Scenario:
     """The scenario of a seed."""
     rng = np.random.default_rng([seed, 77])
     mode = _one_of(rng, (PlanningMode.END_CLOUD,) * 3 + (PlanningMode.CLOUD, PlanningMode.ONBOARD))
-    mission = _room(rng)
+    n = _one_of(rng, FLEETS)
+    mission = _room(rng, n)
     with_companions = mode.needs_companions
     truth = _with_a_pillar(mission, rng) if with_companions and rng.random() < 0.5 else mission
-    drawn = [_one_of(rng, FAULTS)(rng) for _ in range(int(rng.integers(0, MOST_FAULTS + 1)))]
+    drawn = [_one_of(rng, FAULTS)(rng, n) for _ in range(int(rng.integers(0, MOST_FAULTS + 1)))]
     ends = tuple(fault for fault in drawn if isinstance(fault, Fault)) if with_companions else ()
     simulation = msgspec.structs.replace(
         mission.simulation,
         ground_link=_ground_link(rng),
+        onboard_link=LinkSettings(corruption=_one_of(rng, (0.0, 0.0, 0.0, 0.01))),
         fleet_link=_fleet_link(rng),
         faults=tuple(fault for fault in drawn if isinstance(fault, SimulatorFault)),
     )
@@ -86,17 +100,26 @@ def draw(seed: int) -> Scenario:
         msgspec.structs.replace(mission, simulation=simulation),
         msgspec.structs.replace(truth, simulation=simulation),
         ends,
+        (*_restarts(rng, ends), *_mishaps(rng, n, with_companions)),
     )
 
 
 @functools.cache
-def _indoor() -> Mission:
-    return load_mission("indoor")
+def _fleet_of(n: int) -> Mission:
+    """The paper's two vehicles, or as many of the ten that cross its room to permuted targets."""
+    if n == 2:
+        return load_mission("indoor")
+    mission = load_mission("fleet-10")
+    vehicles, routes = mission.vehicles[:n], mission.routes
+    assert routes is not None
+    flown = {vehicle.name: routes[vehicle.name] for vehicle in vehicles}
+    targets = tuple(target for target in mission.targets if any(target.name in route for route in flown.values()))
+    return msgspec.structs.replace(mission, vehicles=vehicles, targets=targets, allocation=flown)
 
 
-def _room(rng: Rng) -> Mission:
+def _room(rng: Rng, n: int) -> Mission:
     """The paper's room with its two obstacles somewhat elsewhere."""
-    mission = _indoor()
+    mission = _fleet_of(n)
     (crate,), (column,) = mission.world.boxes, mission.world.cylinders
     while True:
         east_m, north_m = rng.uniform(-1.0, 1.0, 2)
@@ -136,6 +159,7 @@ def _ground_link(rng: Rng) -> LinkSettings:
         jitter_s=_one_of(rng, (0.0, 0.02, 0.2)),
         duplicates=_one_of(rng, (0.0, 0.1)),
         reorder=_one_of(rng, (0.0, 0.1)),
+        corruption=_one_of(rng, CORRUPTIONS),
         blackouts=(Blackout(from_s=_moment(rng), duration_s=_one_of(rng, BLACKOUTS_S)),) if dark else (),
     )
 
@@ -148,22 +172,52 @@ def _moment(rng: Rng) -> float:
     return float(np.round(rng.uniform(0.0, FLIGHT_S), 1))
 
 
-def _who(rng: Rng) -> int:
-    return int(rng.integers(1, 3))
+def _who(rng: Rng, n: int) -> int:
+    return int(rng.integers(1, n + 1))
 
 
-FAULTS: tuple[Callable[[Rng], Fault | SimulatorFault], ...] = (
-    lambda rng: CompanionKill(vehicle=_who(rng), at_s=_moment(rng)),
-    lambda rng: CompanionHang(vehicle=_who(rng), at_s=_moment(rng)),
-    lambda rng: GpsLoss(vehicle=_who(rng), duration_s=_one_of(rng, (0.5, 3.0, None)), at_s=_moment(rng)),
-    lambda rng: MotorFailure(vehicle=_who(rng), motor=int(rng.integers(1, 5)), at_s=_moment(rng)),
-    lambda rng: BatteryLevel(vehicle=_who(rng), remaining=_one_of(rng, (0.03, 0.08, 0.2)), at_s=_moment(rng)),
-    lambda rng: Reboot(vehicle=_who(rng), at_s=_moment(rng)),
-    lambda rng: Weather(east_m_s=float(rng.normal(0, 2)), north_m_s=float(rng.normal(0, 2)), gust_std_m_s=0.5),
-    lambda rng: SensorNoise(horizontal_std_m=0.08, vertical_std_m=0.08, velocity_std_m_s=0.08, at_s=_moment(rng)),
-    lambda rng: LinkFault(
+def _restarts(rng: Rng, ends: tuple[Fault, ...]) -> list[Mishap]:
+    """Every second companion that a fault ends is started again."""
+    vehicles = sorted({fault.vehicle for fault in ends})
+    return [
+        CompanionRestart(vehicle=sysid, down_s=_one_of(rng, (0.5, 3.0))) for sysid in vehicles if rng.random() < 0.5
+    ]
+
+
+def _mishaps(rng: Rng, n: int, with_companions: bool) -> list[Mishap]:
+    """One in some flights; a sensor fails only where there is one."""
+    if rng.random() > MISHAPS_SHARE:
+        return []
+    phase, after_s = _one_of(rng, MISHAP_PHASES), float(np.round(rng.uniform(0.0, 6.0), 1))
+    mishap = _one_of(rng, MISHAPS)(rng, n, phase, after_s)
+    return [] if isinstance(mishap, LidarSilence) and not with_companions else [mishap]
+
+
+MISHAPS_SHARE = 0.4
+MISHAP_PHASES = (Phase.WAITING, Phase.PREPARED, Phase.TAKING_OFF, Phase.FLYING, Phase.FLYING, Phase.DONE)
+MISHAPS: tuple[Callable[[Rng, int, Phase, float], Timed], ...] = (
+    lambda rng, n, phase, after_s: GroundCrash(phase=phase, after_s=after_s, down_s=_one_of(rng, (1.0, 5.0, 20.0))),
+    lambda rng, n, phase, after_s: GroundHang(phase=phase, after_s=after_s, lasts_s=_one_of(rng, (0.5, 2.0, 8.0))),
+    lambda rng, n, phase, after_s: WallClockJump(phase=phase, after_s=after_s, by_s=_one_of(rng, CLOCK_JUMPS_S)),
+    lambda rng, n, phase, after_s: LidarSilence(
+        vehicle=_who(rng, n), phase=phase, after_s=after_s, lasts_s=_one_of(rng, (0.3, 1.0, 5.0))
+    ),
+)
+CLOCK_JUMPS_S = (-3600.0, -2.0, 0.5, 2.0, 1e5)
+
+FAULTS: tuple[Callable[[Rng, int], Fault | SimulatorFault], ...] = (
+    lambda rng, n: CompanionKill(vehicle=_who(rng, n), at_s=_moment(rng)),
+    lambda rng, n: CompanionHang(vehicle=_who(rng, n), at_s=_moment(rng)),
+    lambda rng, n: GpsLoss(vehicle=_who(rng, n), duration_s=_one_of(rng, (0.5, 3.0, None)), at_s=_moment(rng)),
+    lambda rng, n: MotorFailure(vehicle=_who(rng, n), motor=int(rng.integers(1, 5)), at_s=_moment(rng)),
+    lambda rng, n: BatteryLevel(vehicle=_who(rng, n), remaining=_one_of(rng, (0.03, 0.08, 0.2)), at_s=_moment(rng)),
+    lambda rng, n: ClockJump(vehicle=_who(rng, n), by_s=_one_of(rng, CLOCK_JUMPS_S), at_s=_moment(rng)),
+    lambda rng, n: Reboot(vehicle=_who(rng, n), at_s=_moment(rng)),
+    lambda rng, n: Weather(east_m_s=float(rng.normal(0, 2)), north_m_s=float(rng.normal(0, 2)), gust_std_m_s=0.5),
+    lambda rng, n: SensorNoise(horizontal_std_m=0.08, vertical_std_m=0.08, velocity_std_m_s=0.08, at_s=_moment(rng)),
+    lambda rng, n: LinkFault(
         link=_one_of(rng, tuple(SimulatedLink)),
-        vehicle=_who(rng),
+        vehicle=_who(rng, n),
         blackout_s=_one_of(rng, BLACKOUTS_S),
         at_s=_moment(rng),
     ),

@@ -76,6 +76,33 @@ def test_every_file_that_is_named_exists():
             assert (ROOT / name).exists(), f"{page.name}: {name}"
 
 
+def rows(page: str, columns: int) -> list[list[str]]:
+    """The cells of all lines of a page's tables with so many columns, heads left out."""
+    lines = [line for line in (ROOT / page).read_text().splitlines() if line.startswith("| ") and "---" not in line]
+    cells = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+    return [row for row in cells if len(row) == columns and row[-1] not in {"deviation", "last soak"}]
+
+
+def test_every_equation_of_the_paper_is_found_in_the_code():
+    table = [row for row in rows("docs/maths/paper.md", 5) if row[0].isdigit() and "`" in row[2]]
+    assert {int(row[0]) for row in table} >= set(range(1, 24))
+    for row in rows("docs/maths/paper.md", 5):
+        if row[2] == "–":
+            continue
+        path, name = row[2].strip("`"), row[3].strip("`")
+        assert re.search(rf"^\s*(?:def|class) {name}\b", (ROOT / path).read_text(), re.M), f"{path}: {name}"
+
+
+def test_every_test_of_the_fault_matrix_exists():
+    table = rows("docs/fault-matrix.md", 5)
+    assert len(table) > 20
+    for fault, _, _, shown_by, _ in table:
+        named = re.findall(r"`(tests/[\w/]+\.py)` `(\w+)`", shown_by)
+        assert named or shown_by == "none", fault
+        for path, name in named:
+            assert re.search(rf"^(?:async )?def {name}\b", (ROOT / path).read_text(), re.M), f"{path}: {name}"
+
+
 def test_the_mission_of_the_tutorial_is_planned(tmp_path: Path):
     (source,) = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs/tutorials/write-a-mission.md").read_text(), re.S)
     path = tmp_path / "warehouse.yaml"

@@ -55,6 +55,17 @@ def test_reordered_datagrams_are_overtaken_and_nothing_is_lost():
     assert 30 < sum(later < earlier for earlier, later in itertools.pairwise(numbers)) < 70
 
 
+def test_of_corrupted_datagrams_one_byte_is_another():
+    sent = bytes(range(40))
+    link = FaultyLink(LinkSettings(corruption=0.25), np.random.default_rng(1))
+    for _ in range(2000):
+        link.send(Direction.UP, sent, 0.0, None)
+    arrived = link.arrived(Direction.UP, 0.0)
+    changed = [sum(a != b for a, b in zip(sent, datagram, strict=True)) for datagram in arrived]
+    assert changed.count(1) == pytest.approx(500, abs=60)
+    assert set(changed) == {0, 1}
+
+
 def test_a_narrow_link_passes_its_bandwidth_and_loses_what_would_wait_too_long():
     arrived = passed(LinkConditions(bandwidth_bytes_s=1000.0), n=1000, n_bytes=100, interval_s=0.005)
     assert len(arrived) == pytest.approx(60, abs=2)  # 5 s and the queue's second at ten a second
@@ -310,6 +321,7 @@ EVERY_FAULT = [
     {"type": "link", "link": "ground", "jitter_s": 0.4},
     {"type": "link", "duplicates": 0.5},
     {"type": "link", "reorder": 0.5},
+    {"type": "link", "corruption": 0.5},
     {"type": "link", "bandwidth_bytes_s": 800},
     {"type": "link", "blackout_s": 0.7},
     {"type": "gps-loss", "vehicle": 1, "duration_s": 1},
@@ -318,6 +330,7 @@ EVERY_FAULT = [
     {"type": "sensor-noise", "horizontal_std_m": 2, "vertical_std_m": 2, "velocity_std_m_s": 1},
     {"type": "weather", "east_m_s": 5, "gust_std_m_s": 2},
     {"type": "reboot", "vehicle": 1},
+    {"type": "clock-jump", "vehicle": 1, "by_s": -30},
 ]
 
 

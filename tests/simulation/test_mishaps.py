@@ -1,0 +1,87 @@
+"""Flights whose ground station crashes or hangs, and whose companions come back, in process."""
+
+import pytest
+
+from gcs.dialect import Mode
+from gcs.flight.monitor import Phase
+from gcs.flight.report import Flown
+from gcs.settings import PlanningMode
+from missions.faults import CompanionKill, Fault
+from missions.mission import load_mission
+from tests.soak.experiment import fly, runs, work
+from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, Mishap, WallClockJump
+from tests.soak.scenario import draw
+from tests.soak.troubled_system import TroubledSystem
+
+INDOOR = load_mission("indoor")
+
+
+def flown(*mishaps: Mishap, mode: PlanningMode = PlanningMode.CLOUD, faults: tuple[Fault, ...] = ()) -> TroubledSystem:
+    system = TroubledSystem(INDOOR, mode, seed=1, mishaps=mishaps, faults=faults)
+    system.fly()
+    return system
+
+
+def flown_by(system: TroubledSystem, sysid: int) -> Flown:
+    return system.flown()[sysid]
+
+
+def kinds(system: TroubledSystem) -> list[str]:
+    return [event.kind for event in system.events.events]
+
+
+def test_a_ground_station_that_crashes_in_flight_finds_back_and_sees_the_arrival():
+    system = flown(GroundCrash(phase=Phase.FLYING, after_s=3.0, down_s=2.0))
+    assert [what for _, what in system.restarts] == ["ground station"]
+    assert kinds(system).count("plan") == 1
+    assert "rejoin" in kinds(system)
+    assert system.flight.passive
+    assert system.flight.success, [part.monitor.reason for part in system.flight.vehicles.values()]
+
+
+def test_a_ground_station_that_crashes_before_the_take_off_begins_anew():
+    system = flown(GroundCrash(phase=Phase.WAITING, after_s=1.0, down_s=5.0))
+    assert [what for _, what in system.restarts] == ["ground station"]
+    assert not system.flight.passive
+    assert system.flight.success, system.error
+
+
+def test_what_the_ground_station_says_to_be_stored_is_looked_up_on_the_vehicle():
+    system = flown()
+    assert kinds(system).count("uploaded") == 2
+    assert not system.false_beliefs
+    system.events.add("uploaded", "another mission than is stored", "alpha", plan_id=77)
+    (belief,) = system.false_beliefs
+    assert "alpha uploaded 0000004d" in belief
+
+
+def test_a_crashed_ground_station_sends_nothing_any_more():
+    system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1)
+    system.process.ended = True
+    system.wire.send(b"anything", ("simulator", 1))
+    assert system.wire.bytes == 0
+
+
+@pytest.mark.parametrize("phase", [Phase.WAITING, Phase.FLYING])
+def test_a_ground_station_that_hangs_for_a_while_goes_on(phase: Phase):
+    system = flown(GroundHang(phase=phase, after_s=1.0, lasts_s=2.0), WallClockJump(phase=phase, after_s=0.5, by_s=-50))
+    assert system.flight.success, system.error
+    assert not system.restarts
+
+
+def test_a_companion_that_comes_back_does_not_take_over_by_itself():
+    ends, back = (CompanionKill(vehicle=1, at_s=2.0),), CompanionRestart(vehicle=1, down_s=1.0)
+    system = flown(back, mode=PlanningMode.END_CLOUD, faults=ends)
+    assert [what for _, what in system.restarts] == ["companion 1"]
+    assert not system.flight.success
+    died_s = system.deaths[1]
+    held_s = next(at_s for at_s, mode in system.modes[1] if at_s > died_s and mode is Mode.HOLD)
+    landed_s = float(flown_by(system, 1).times_s[flown_by(system, 1).positions_m[:, 2] > 0.3][-1])
+    assert [mode for at_s, mode in system.modes[1] if held_s < at_s < landed_s] == [Mode.LAND]
+    assert system.flight.vehicles[2].monitor.reached
+
+
+def test_a_seed_is_one_scenario_and_one_flight_to_the_bit():
+    seed = next(seed for seed in range(100) if draw(seed).mode is PlanningMode.CLOUD and draw(seed).mishaps)
+    assert draw(seed) == draw(seed)
+    assert fly(draw(seed), seed)[-1] == work(runs([seed])[0])

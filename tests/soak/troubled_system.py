@@ -1,0 +1,256 @@
+"""The whole system with a ground station that crashes, hangs and is started again, and companions that come back."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from gcs.errors import GcsError
+from gcs.flight.events import Event, EventLog
+from gcs.flight.journal import JOURNAL_FILE, JournalKeeper
+from gcs.flight.monitor import Phase
+from gcs.flight.rejoining import rejoin, told_flight, unfinished
+from gcs.flight.report import FlightReport, make_report
+from gcs.flight.sequence import FleetFlight
+from gcs.link.connection import Address, Connection
+from gcs.station import Station
+from missions.mission import Vehicle
+from missions.mission_items import plan_id
+from sitl.simulator import UTC_START_US
+from tests.simulation.whole_system import MOST_WAITING, GroundWire, LidarWire, WholeSystem
+from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, LidarSilence, Mishap, Timed, WallClockJump
+
+LOOK_INTERVAL_S = 0.1
+OPERATOR_S = 10.0
+"""Whoever sits at the page of a restarted ground station lands what has not flown its mission for so long."""
+LONGEST_S = 900.0
+"""No flight is watched for longer after a restart; endurance is over by then."""
+PHASES = list(Phase)
+
+
+class FailingLidar(LidarWire):
+    """A lidar's wire that can be dead for a while."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.dead = False
+
+    def poll(self) -> Iterator[bytes]:
+        if self.dead:
+            self.waiting.clear()
+        yield from super().poll()
+
+
+class GroundProcess:
+    """What of the ground station ends with its process: the station, its wire, and what waits in its socket."""
+
+    def __init__(self, system: "TroubledSystem") -> None:
+        self.station = DeafStation(self, system.wall_clock_us)
+        self.wire = HaltedWire(self, system)
+        self.station.connections.append(self.wire)
+        self.halted = self.ended = False
+        self.waiting_in: deque[tuple[bytes, Address]] = deque(maxlen=MOST_WAITING)
+        self.waiting_out: list[tuple[bytes, Address]] = []
+
+    def go_on(self) -> None:
+        """End a hang: what has waited comes and goes at once."""
+        self.halted = False
+        while self.waiting_in:
+            self.station.receive(self.wire, *self.waiting_in.popleft())
+        for datagram, address in self.waiting_out:
+            self.wire.send(datagram, address)
+        self.waiting_out = []
+
+
+class DeafStation(Station):
+    """A station that takes in nothing while its process hangs, and never again when that has ended."""
+
+    def __init__(self, process: GroundProcess, unix_us: Callable[[], int]) -> None:
+        super().__init__(unix_us=unix_us)
+        self._process = process
+
+    def receive(self, connection: Connection, datagram: bytes, address: Address) -> None:
+        if self._process.ended:
+            return
+        if self._process.halted:
+            self._process.waiting_in.append((datagram, address))
+            return
+        super().receive(connection, datagram, address)
+
+
+class HaltedWire(GroundWire):
+    """Likewise the way out."""
+
+    def __init__(self, process: GroundProcess, system: "TroubledSystem") -> None:
+        super().__init__(system.simulator)
+        self._process = process
+
+    def send(self, datagram: bytes, address: Address) -> None:
+        if self._process.halted:
+            self._process.waiting_out.append((datagram, address))
+        elif not self._process.ended:
+            super().send(datagram, address)
+
+
+@dataclass
+class TroubledSystem(WholeSystem):
+    """One flight in which more goes wrong than links, vehicles and companions.
+
+    Args:
+        mishaps: what, and when.
+    """
+
+    mishaps: tuple[Mishap, ...] = ()
+    restarts: list[tuple[float, str]] = field(default_factory=list)
+    """(simulated time, what) of everything that came back."""
+    false_beliefs: list[str] = field(default_factory=list)
+    """What the ground station said to be stored, and was not at that moment."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._clock_ahead_us = 0
+        self._begin_process()
+        self.lidars = {vehicle.sysid: FailingLidar() for vehicle in self.mission.vehicles}
+
+    def wall_clock_us(self) -> int:
+        """UTC as the ground's machine has it."""
+        return UTC_START_US + round(self.simulator.time_s * 1e6) + self._clock_ahead_us
+
+    def _begin_process(self) -> None:
+        self.process = GroundProcess(self)
+        self.station, self.wire = self.process.station, self.process.wire
+
+    # ---------------------------------------------------------------- the flight
+    async def _fly(self) -> FlightReport:
+        with TemporaryDirectory() as folder:
+            self._folder = Path(folder)
+            return await self._fly_with_mishaps()
+
+    async def _fly_with_mishaps(self) -> FlightReport:
+        async with asyncio.TaskGroup() as group:
+            self._group = group
+            background = [group.create_task(self.simulate())]
+            background += [group.create_task(self._befall(m)) for m in self.mishaps if isinstance(m, Timed)]
+            if self.mode.needs_companions:
+                background += [group.create_task(self._companion(vehicle)) for vehicle in self.mission.vehicles]
+            self._ended = asyncio.Event()
+            self._start_ground()
+            await self._ended.wait()
+            for task in (*background, *self._ground):
+                task.cancel()
+        reason = str(self.error) if self.error else ""
+        time_s = self.simulator.time_s
+        return make_report(self.flight, self.flown(), reason=reason, wall_s=time_s, sim_s=time_s)
+
+    def _start_ground(self) -> None:
+        """A process of the ground station begins: back into the flight that its journal tells of, or with a new one."""
+        story, mission = unfinished(self._folder, self.mission), self.mission
+        self._journal = JournalKeeper(self._folder / JOURNAL_FILE)
+        if not hasattr(self, "events"):
+            self.events = EventLog(asyncio.get_running_loop().time, listeners=[self._check_belief])
+        if story is not None:
+            self.flight = told_flight(story, self.station, self.events)
+        else:
+            self.flight = FleetFlight(self.station, mission, self.mode, self._plan, self.events)
+            self._journal.begin(self.flight, self.station.unix_us())
+        tasks = (self._operate(story is not None), self.station.send_heartbeats(), self._keep_journal())
+        self._ground = [self._group.create_task(task) for task in tasks]
+
+    async def _operate(self, rejoining: bool) -> None:
+        """The flight, or what is left of it with somebody at the page."""
+        try:
+            if rejoining:
+                await rejoin(self.flight, self.events)
+                async with asyncio.timeout(LONGEST_S), asyncio.TaskGroup() as group:
+                    operator = group.create_task(self._land_who_waits())
+                    await self.flight.watch()
+                    operator.cancel()
+            else:
+                await self.operate(self.flight)
+        except GcsError as problem:
+            self.error = problem
+        self._ended.set()
+
+    async def _land_who_waits(self) -> None:
+        """What an operator does after a restart: who does not fly its mission is landed, again until it lands."""
+        since_s: dict[int, float] = {}
+        while True:
+            for part in self.flight.in_flight:
+                now_s = self.station.now_s
+                if part.monitor.phase is Phase.FLYING:
+                    since_s.pop(part.sysid, None)
+                elif now_s - since_s.setdefault(part.sysid, now_s) > OPERATOR_S:
+                    since_s[part.sysid] = now_s
+                    try:
+                        await self.flight.orders.land(part)
+                    except GcsError as problem:
+                        self.events.add("refused", str(problem), part.name)
+            await asyncio.sleep(1.0)
+
+    async def _keep_journal(self) -> None:
+        try:
+            while True:
+                self._journal.look(self.flight, self.station.unix_us())
+                await asyncio.sleep(LOOK_INTERVAL_S)
+        finally:
+            self._journal.close()
+
+    async def _companion(self, vehicle: Vehicle) -> None:
+        await super()._companion(vehicle)
+        back = [m for m in self.mishaps if isinstance(m, CompanionRestart) and m.vehicle == vehicle.sysid]
+        if back and vehicle.sysid in self.deaths:
+            await asyncio.sleep(back[0].down_s)
+            self.faults = tuple(fault for fault in self.faults if fault.vehicle != vehicle.sysid)
+            self.restarts.append((self.simulator.time_s, f"companion {vehicle.sysid}"))
+            await super()._companion(vehicle)
+
+    def _check_belief(self, event: Event) -> None:
+        """Whoever says that a mission is stored has to be right in this very moment."""
+        if event.kind not in {"uploaded", "swapped"}:
+            return
+        sysid = next(vehicle.sysid for vehicle in self.mission.vehicles if vehicle.name == event.vehicle)
+        stored = plan_id(self.simulator.vehicles[sysid].autopilot.navigator.mission.plan.items)
+        if stored != event.data["plan_id"]:
+            self.false_beliefs.append(f"{event.vehicle} {event.kind} {event.data['plan_id']:08x}, has {stored:08x}")
+
+    # ------------------------------------------------------------------- mishaps
+    async def _befall(self, mishap: Timed) -> None:
+        """Wait until it is time, and let it happen."""
+        await self.station.holds_within(lambda: self._has_come_to(mishap.phase), float("inf"), LOOK_INTERVAL_S)
+        await asyncio.sleep(mishap.after_s)
+        match mishap:
+            case GroundCrash():
+                await self._crash(mishap.down_s)
+            case GroundHang():
+                process, process.halted = self.process, True
+                await asyncio.sleep(mishap.lasts_s)
+                process.go_on()
+            case WallClockJump():
+                self._clock_ahead_us += round(mishap.by_s * 1e6)
+            case LidarSilence():
+                lidar = self.lidars[mishap.vehicle]
+                lidar.dead = True
+                await asyncio.sleep(mishap.lasts_s)
+                lidar.dead = False
+
+    def _has_come_to(self, phase: Phase) -> bool:
+        if phase is Phase.WAITING:
+            return True
+        parts = self.flight.vehicles.values()
+        return any(PHASES.index(part.monitor.phase) >= PHASES.index(phase) for part in parts)
+
+    async def _crash(self, down_s: float) -> None:
+        """As by SIGKILL: nothing more is sent, whatever the cancelled coroutines want to say."""
+        self.process.ended = True
+        tasks = self._ground
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+        self._begin_process()
+        self.process.ended = True  # nobody listens until it is started
+        await asyncio.sleep(down_s)
+        self.process.ended = False
+        self.restarts.append((self.simulator.time_s, "ground station"))
+        self._start_ground()
