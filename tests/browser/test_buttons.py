@@ -89,7 +89,7 @@ async def test_planning_comparing_editing_and_loading_what_was_edited(open_page:
     desk = scripted.desk
     assert desk.flight is not None
 
-    async def plan(mission: Mission) -> FleetPlan:
+    async def plan(mission: Mission, *_: object) -> FleetPlan:
         await scripted._plan(mission)
         return replace(scripted_plan(mission), algorithm=choice.algorithm)
 
