@@ -87,9 +87,9 @@ def _endings(scenario: Scenario, system: TroubledSystem, report: FlightReport) -
             yield f"vehicle {sysid} is {part.monitor.phase.value} at the end of the flight"
         if part.monitor.phase is Phase.DONE and not part.monitor.reason:
             yield f"vehicle {sysid} is done without a reason"
-    for sysid, vehicle in system.simulator.vehicles.items():
+    for sysid in system.simulator.vehicles:
         state = system.station.fleet.vehicles.get(sysid)
         speed_m_s = float(np.linalg.norm(system.truth[-1][2][sysid - 1])) if system.truth else 0.0
-        if speed_m_s > 1.0 and not vehicle.landed and not excused(scenario, sysid, FALLING + ASTRAY):
+        if speed_m_s > 1.0 and not excused(scenario, sysid, FALLING + ASTRAY):
             seen = "unheard" if state is None else LandedState(state.landed).name
             yield f"vehicle {sysid} still moves at {speed_m_s:.1f} m/s at the end ({seen})"
