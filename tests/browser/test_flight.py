@@ -40,7 +40,7 @@ async def test_the_indoor_mission_is_flown_before_the_operators_eyes(browser: Br
 
 
 async def test_a_flight_whose_ground_station_is_gone_is_watched_by_another_one(browser: Browser, tmp_path: Path):
-    """The operator presses Fly, and Hold; that ground station is killed, and from another one the vehicles are landed."""
+    """Fly and Hold are pressed, that ground station is killed, and from another one the vehicles are landed."""
     ports, base = (free_port(), free_port()), ["--instance-base", str(INSTANCE_BASE + 10)]
     options = ["--mode", "cloud", "--port", str(ports[0]), *base, "--report", str(tmp_path)]
     async with program("sitl", "indoor", *base):
