@@ -22,6 +22,7 @@ from companion.link.autopilot import Autopilot
 from companion.observations import Observations
 from companion.pilot import Pilot
 from companion.planner.planner import Plan, Planner, PlanRequest
+from companion.report_budget import ReportBudget
 from companion.sensing.scan import Scan
 from companion.sensing.sensing import Sensing
 from companion.settings import CompanionSettings
@@ -81,7 +82,8 @@ class App:
         self._ended = asyncio.Event()
         self._state = self.pilot.state
         self._actions: set[asyncio.Task[None]] = set()
-        self.observations = Observations(self.planner.voxel_m, self.settings.report_bytes_s)
+        self.budget = ReportBudget(self.settings.report_bytes_s, self.settings.speed)
+        self.observations = Observations(self.planner.voxel_m, self.budget)
         self._noted_s = -math.inf
         self._unseen: Scan | None = None
         self._observing = False
@@ -128,7 +130,9 @@ class App:
                 notice(self.sensing, event, self._now_s)
             if self.fleet is not None:
                 self.fleet.notice(event)
-            if not isinstance(event, events.RingReported):
+            if isinstance(event, events.ReceiptHeard):
+                self.budget.take(event.sender, event.receipt, self._now_s)
+            elif not isinstance(event, events.RingReported):
                 self._handle(event)
 
     async def _tick(self) -> None:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from companion.planner.planner import Plan
 from missions.frames import GeodeticPoint
 from missions.mission_items import MissionItem
+from missions.tunnel import Receipt
 
 Array = npt.NDArray[np.float64]
 
@@ -161,6 +162,14 @@ class RingReported:
 
 
 @dataclass(frozen=True)
+class ReceiptHeard:
+    """How much of the companion's reports a ground station has heard."""
+
+    sender: Sender
+    receipt: Receipt
+
+
+@dataclass(frozen=True)
 class StopRequested:
     """The program shall end: SIGTERM, Ctrl-C, or its parent is gone."""
 
@@ -196,6 +205,7 @@ Event = (
     | ModeCommandEnded
     | PlanReady
     | RingReported
+    | ReceiptHeard
     | StopRequested
     | Tick
 )

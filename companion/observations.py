@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from companion.report_budget import ReportBudget
 from missions.occupancy import (
     BLOCK_VOXELS,
     BlockIndex,
@@ -48,12 +49,12 @@ class Observations:
 
     Args:
         map_voxel_m: edge of a voxel of the map, which holds what the mission does not explain [m].
-        budget_bytes_s: of the link, for these reports [bytes/s of vehicle time].
+        budget: what of the link is for these reports.
     """
 
-    def __init__(self, map_voxel_m: float, budget_bytes_s: float) -> None:
+    def __init__(self, map_voxel_m: float, budget: ReportBudget) -> None:
         self.voxel_m = COARSENING * map_voxel_m
-        self.budget_bytes_s = budget_bytes_s
+        self._budget = budget
         self._blocks: dict[BlockIndex, _Block] = {}
         self._saved_bytes, self._saved_at_s = 0.0, -np.inf
 
@@ -95,6 +96,7 @@ class Observations:
         for_repeats = max(affordable - len(changed), 0)
         chosen = changed[:affordable] + repeated[:for_repeats]
         self._saved_bytes -= FRAME_BYTES * len(chosen)
+        self._budget.spent(len(chosen), now_s)
         return [self._sent(index, now_s) for index in chosen]
 
     def _sent(self, index: BlockIndex, now_s: float) -> bytes:
@@ -105,8 +107,8 @@ class Observations:
     def _save_up(self, now_s: float) -> float:
         passed_s = min(max(now_s - self._saved_at_s, 0.0), BURST_S)
         self._saved_at_s = now_s
-        self._saved_bytes += passed_s * self.budget_bytes_s
-        self._saved_bytes = min(self._saved_bytes, max(BURST_S * self.budget_bytes_s, FRAME_BYTES))
+        bytes_s = self._budget.bytes_s(now_s)
+        self._saved_bytes = min(self._saved_bytes + passed_s * bytes_s, max(BURST_S * bytes_s, FRAME_BYTES))
         return self._saved_bytes
 
     def _change(self, index: BlockIndex, seen: BoolArray | None, low_m: Array, high_m: Array, now_s: float) -> None:

@@ -2,16 +2,18 @@
 
 import asyncio
 import ctypes
+import math
 import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import Connection
 from typing import Any
 
-from gcs.planner import ALGORITHMS, plan_mission
+from gcs.planner import ALGORITHMS, NO_FLOWN_PLAN, FlownPlan, plan_mission
 from gcs.planner.plan import FleetPlan, Progress
 from missions.mission import Mission
 
@@ -23,6 +25,8 @@ _cancelled: Any
 """In the worker: number of the latest plan that nobody wants any more, shared with the parent."""
 
 CANCEL_TIMEOUT_S = 1.0
+DEADLINE_S = 2.0
+"""Of a plan in flight: vehicles move on while it is made, and what comes late is for places that they have left."""
 
 
 class PlannerProcess:
@@ -44,8 +48,10 @@ class PlannerProcess:
         work = (self._sender, self._cancelled)
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=work)
 
-    async def plan(self, mission: Mission) -> FleetPlan:
+    async def plan(self, mission: Mission, flown: FlownPlan = NO_FLOWN_PLAN, /) -> FleetPlan:
         """Plan for the whole fleet; when it is cancelled, the search is ended first.
+
+        While something is flown, it ends in `DEADLINE_S` at the latest.
 
         Raises:
             MissionError: the mission cannot be planned for.
@@ -53,7 +59,7 @@ class PlannerProcess:
         loop = asyncio.get_running_loop()
         loop.add_reader(self._receiver.fileno(), self._drain)
         self._plans += 1
-        search = loop.run_in_executor(self._pool, _plan, mission, self.algorithm, self._seed, self._plans)
+        search = loop.run_in_executor(self._pool, _plan, mission, flown, self.algorithm, self._seed, self._plans)
         try:
             return await asyncio.shield(search)
         except asyncio.CancelledError:
@@ -101,11 +107,13 @@ def _exit_after_parent() -> None:
     os._exit(1)
 
 
-def _plan(mission: Mission, algorithm: str, seed: int, number: int) -> FleetPlan:
+def _plan(mission: Mission, flown: FlownPlan, algorithm: str, seed: int, number: int) -> FleetPlan:
+    deadline_s = time.monotonic() + (DEADLINE_S if flown.curves_m else math.inf)
     return plan_mission(
         mission,
         algorithm=algorithm,
         seed=seed,
         on_progress=_progress.send,
-        should_stop=lambda: _cancelled.value >= number,
+        should_stop=lambda: _cancelled.value >= number or time.monotonic() >= deadline_s,
+        flown=flown,
     )

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from gcs.dialect import AUTOPILOT, Message, mavlink
+from gcs.dialect import AUTOPILOT, COMPANION, Message, mavlink
 from gcs.errors import AmbiguousVehicle, LinkLost
 from gcs.exchange import Exchange
 from gcs.fleet.fleet import Fleet
@@ -24,6 +24,7 @@ from gcs.link.tlog import TlogWriter
 from gcs.microservices import Microservice
 from gcs.microservices.mission_messages import LinkEstimate
 from gcs.security.audit import Audit
+from missions.tunnel import MAX_PAYLOAD_BYTES, PayloadType, Receipt, encode_receipt
 
 HEARTBEAT_INTERVAL_S = 1.0
 MOST_NOTICES, NOTICES_WINDOW_S = 20, 10.0
@@ -136,6 +137,7 @@ class Station:
                 self._transmit(heartbeat, (connection, address), sysid)
             for sysid in self.fleet.vehicles:
                 self._measure_round_trips(sysid)
+                self._acknowledge_observations(sysid)
             await asyncio.sleep(HEARTBEAT_INTERVAL_S)
 
     async def holds_within(self, condition: Callable[[], bool], timeout_s: float, poll_s: float = 0.02) -> bool:
@@ -222,6 +224,16 @@ class Station:
             self._transmit(mavlink.MAVLink_timesync_message(0, path.ping(self.now_s)), way, sysid)
             if len(live) > 1 and path.hardware_id is None:
                 self._transmit(_who_are_you(sysid), way, sysid)
+
+    def _acknowledge_observations(self, sysid: int) -> None:
+        """Tell a companion how much of it is heard: its reports take as much of the link as there is."""
+        companion = self.fleet.vehicles[sysid].companion
+        if companion.status is None or not self.fleet.vehicles[sysid].companion_online(self.now_s):
+            return
+        age_s, boot_ms = self.now_s - companion.status_s, companion.status.time_boot_ms
+        payload = encode_receipt(Receipt(heard=companion.observations_heard, time_boot_ms=boot_ms, age_s=age_s))
+        padded = list(payload.ljust(MAX_PAYLOAD_BYTES, b"\0"))
+        self.send(mavlink.MAVLink_tunnel_message(sysid, COMPANION, PayloadType.RECEIPT, len(payload), padded), sysid)
 
     def _send_all(self, messages: Iterable[Message], sysid: int) -> None:
         for message in messages:

@@ -25,6 +25,8 @@ class PayloadType(IntEnum):
     COMPANION_STATUS = 0x8052
     OCCUPANCY = 0x8053
     """Its codec is `missions.occupancy`."""
+    RECEIPT = 0x8054
+    """Down: how much of what a companion sends has arrived."""
 
 
 class TrajectoryKind(IntEnum):
@@ -112,9 +114,25 @@ class CompanionStatus(msgspec.Struct, frozen=True, kw_only=True):
     time_boot_ms: int = 0
 
 
+class Receipt(msgspec.Struct, frozen=True, kw_only=True):
+    """A ground station's word on what it hears of a companion, once a second of its clock.
+
+    Both ends count occupancy messages from wherever they began, so only differences mean something.
+    """
+
+    heard: int
+    """Occupancy messages so far, modulo `RECEIPT_COUNTS`."""
+    time_boot_ms: int
+    """Of the newest status that was heard."""
+    age_s: float
+    """How long ago that was, on the ground station's clock; up to 65 s."""
+
+
+RECEIPT_COUNTS = 2**16
 _TRAJECTORY = struct.Struct("<BBBBIIQiiiIHiH")
 _POINT = struct.Struct("<hhh")
 _STATUS = struct.Struct("<BBBxIIHHHHHHI")
+_RECEIPT = struct.Struct("<BxHIH")
 MOST_POINTS = (MAX_PAYLOAD_BYTES - _TRAJECTORY.size) // _POINT.size
 """Control points of a trajectory that fit into a payload."""
 _TIME_UNIT_S = 1e-4
@@ -218,6 +236,24 @@ def decode_status(payload: bytes) -> CompanionStatus:
         tick_lateness_max_ms=late / 10.0,
         time_boot_ms=boot_ms,
     )
+
+
+def encode_receipt(receipt: Receipt) -> bytes:
+    """The payload of a RECEIPT message."""
+    age_ms = _clipped(receipt.age_s * 1e3)
+    return _RECEIPT.pack(VERSION, receipt.heard % RECEIPT_COUNTS, receipt.time_boot_ms & 0xFFFFFFFF, age_ms)
+
+
+def decode_receipt(payload: bytes) -> Receipt:
+    """The message in a RECEIPT payload.
+
+    Raises:
+        WireFormatError: wrong version or length.
+    """
+    version, heard, time_boot_ms, age_ms = _unpack(_RECEIPT, payload)
+    if version != VERSION:
+        raise WireFormatError(f"receipt: version {version}, expected {VERSION}")
+    return Receipt(heard=heard, time_boot_ms=time_boot_ms, age_s=age_ms / 1e3)
 
 
 def _unpack(layout: struct.Struct, payload: bytes) -> tuple[int, ...]:

@@ -18,9 +18,13 @@ from companion.events import (
     ModeReported,
     Odometry,
     OriginReported,
+    ReceiptHeard,
+    Sender,
     UtcReported,
 )
+from missions.errors import WireFormatError
 from missions.frames import GeodeticPoint
+from missions.tunnel import PayloadType, decode_receipt
 
 MAV_FRAME_LOCAL_NED = 1
 SAFETY_ARMED = 128
@@ -76,6 +80,29 @@ class CommandLong(msgspec.Struct, frozen=True):
     command: int
     target_system: int
     target_component: int
+
+
+class TunnelMessage(msgspec.Struct, frozen=True):
+    """TUNNEL."""
+
+    target_system: int
+    target_component: int
+    payload_type: int
+    payload_length: int
+    payload: tuple[int, ...]
+
+    def receipt(self, sender: Sender) -> list[Event]:
+        """What a ground station says of how it hears us; nothing if this is something else.
+
+        Raises:
+            ValueError: it cannot be read.
+        """
+        if self.payload_type != PayloadType.RECEIPT:
+            return []
+        try:
+            return [ReceiptHeard(sender, decode_receipt(bytes(self.payload[: self.payload_length])))]
+        except WireFormatError as unreadable:
+            raise ValueError(str(unreadable)) from None
 
 
 class CommandAck(msgspec.Struct, frozen=True):

@@ -37,7 +37,7 @@ from companion.events import (
     StartCommanded,
 )
 from companion.instructions import CommandResult
-from companion.link.messages import EVENTS_OF, CommandAck, CommandLong, OdometryMessage
+from companion.link.messages import EVENTS_OF, CommandAck, CommandLong, OdometryMessage, TunnelMessage
 from companion.setpoints import Setpoint
 from missions.mission_items import MissionItem
 from missions.tunnel import MAX_PAYLOAD_BYTES, PayloadType, Reason
@@ -135,6 +135,7 @@ class Px4:
                 self._adopt(system, direct)
             else:
                 direct.subscribe_message("COMMAND_LONG", lambda message, _: self._soon(self._on_command, message))
+                direct.subscribe_message("TUNNEL", lambda message, _: self._soon(self._on_tunnel, message))
 
     def _adopt(self, system: System, direct: MavlinkDirect) -> None:
         self._system = system
@@ -193,6 +194,13 @@ class Px4:
             addressed = (command.target_system, command.target_component) == (self._sysid, COMPANION)
             if addressed and command.command == MISSION_START:
                 self._events.put_nowait(StartCommanded(Sender(message.system_id, message.component_id)))
+
+    def _on_tunnel(self, message: MavlinkMessage) -> None:
+        sender = Sender(message.system_id, message.component_id)
+        for tunnel in self._read(message, lambda fields: [msgspec.json.decode(fields, type=TunnelMessage)]):
+            if (tunnel.target_system, tunnel.target_component) == (self._sysid, COMPANION):
+                for event in self._read(message, lambda _, tunnel=tunnel: tunnel.receipt(sender)):
+                    self._events.put_nowait(event)
 
     def _read(self, message: MavlinkMessage, reader: Callable[[bytes], list[T]]) -> list[T]:
         """What a message says; one that cannot be read is counted and dropped."""

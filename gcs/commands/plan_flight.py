@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 
 from gcs.errors import UsageError
+from gcs.planner.flown_plan import NO_FLOWN_PLAN, FlownPlan
 from gcs.planner.plan import FleetPlan, Progress
 from gcs.settings import FlightSettings, PlanningMode
 from missions.mission import Mission
@@ -21,7 +22,7 @@ class GivenPlanner:
     given: FleetPlan
     on_progress: list[Callable[[Progress], None]] = field(default_factory=list)
 
-    async def plan(self, mission: Mission) -> FleetPlan:
+    async def plan(self, mission: Mission, flown: FlownPlan = NO_FLOWN_PLAN, /) -> FleetPlan:
         """The plan, whatever the mission: it was made from it."""
         return self.given
 

@@ -51,6 +51,10 @@ class CompanionView:
     heard_s: float = -math.inf
     """Last message of any kind."""
     status: tunnel.CompanionStatus | None = None
+    status_s: float = -math.inf
+    """When that came."""
+    observations_heard: int = 0
+    """Messages about what it has seen."""
     trajectory: Trajectory | None = None
     """The trajectory that it flies; its `start_s` is UTC [s]."""
     trajectory_revision: int = -1
@@ -134,15 +138,17 @@ class VehicleState:
         self.companion.heard_s = now_s
         if message.get_type() == "TUNNEL":
             try:
-                self._fold_tunnel(message)
+                self._fold_tunnel(message, now_s)
             except WireFormatError:
                 self.undecodable += 1
 
-    def _fold_tunnel(self, message: Message) -> None:
+    def _fold_tunnel(self, message: Message, now_s: float) -> None:
         payload = bytes(message.payload[: message.payload_length])
         match message.payload_type:
             case tunnel.PayloadType.COMPANION_STATUS:
-                self.companion.status = tunnel.decode_status(payload)
+                self.companion.status, self.companion.status_s = tunnel.decode_status(payload), now_s
+            case tunnel.PayloadType.OCCUPANCY:
+                self.companion.observations_heard += 1
             case tunnel.PayloadType.TRAJECTORY:
                 received = tunnel.decode_trajectory(payload)
                 self.companion.trajectory = received.trajectory

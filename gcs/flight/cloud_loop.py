@@ -18,6 +18,7 @@ from gcs.flight.monitor import Phase
 from gcs.flight.preparation import mission_items
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.planner.curves import lengths
+from gcs.planner.flown_plan import FlownPlan
 from gcs.planner.plan import FleetPlan, VehiclePlan
 from gcs.replanning.remaining import Aloft, remaining_mission
 from gcs.replanning.replanner import Cause, Replanner
@@ -109,7 +110,7 @@ class CloudLoop:
         flight.events.add("replan", f"planning anew: {cause.value}", cause=cause.name.lower())
         rest = remaining_mission(flight.mission, aloft, (*observed.boxes(), *self._parked(aloft)))
         try:
-            plan = await flight.planner(rest)
+            plan = await flight.planner(rest, FlownPlan({vehicle.sysid: vehicle.curve_m for vehicle in aloft}))
         except MissionError as problem:
             flight.events.add("replan", f"no plan: {problem}", severity=Severity.WARNING)
             self.replanner.put_off(self._now_s)

@@ -10,7 +10,7 @@ from enum import Enum
 import numpy as np
 
 from gcs.dialect import Mode
-from gcs.fleet.vehicle_state import LandedState, VehicleState
+from gcs.fleet.vehicle_state import LINK_TIMEOUT_S, LandedState, VehicleState
 from gcs.flight.route import RouteWatch
 from missions.frames import LocalFrame
 from missions.mission import OnArrival, Target
@@ -24,6 +24,9 @@ TAKEOVER_GRACE_S = 3.0
 
 HOLD_AGAIN_S = 1.5
 """Between two orders to hold, to a vehicle whose companion took over after the operator's [s, wall clock]."""
+
+NEWS_S = 2.0
+"""A vehicle that is heard again has said within this whether it has landed [s, wall clock]."""
 
 UNATTENDED_HOLD_S = 5.0
 """With nobody at the page, an interrupted vehicle holds for so long and is then landed [s]."""
@@ -132,7 +135,7 @@ class VehicleMonitor:
         return float(np.linalg.norm((position_m - np.array(self.target.position_m))[:axes]))
 
     def _flying(self, state: VehicleState, now_s: float) -> Mode | None:
-        if state.vehicle_time_s(now_s, self.speed) - self.started_s > self.endurance_s:
+        if self._is_overdue(state, now_s):
             self.come_down(f"not at its target after {self.endurance_s:g} s, its endurance")
             return Mode.LAND
         self._was_at_target = self._was_at_target or self.distance_to_target_m(state) <= self.tolerance_m
@@ -143,6 +146,11 @@ class VehicleMonitor:
             self._arrive("holding at its target")
             return None
         return self._companion_flight(state, now_s) if self.flown_by_companion else self._cloud_flight(state, now_s)
+
+    def _is_overdue(self, state: VehicleState, now_s: float) -> bool:
+        """It flies longer than it may, as it says itself: of one that was not heard for long nobody knows that."""
+        heard = now_s - state.telemetry_s < LINK_TIMEOUT_S and now_s - state.link_since_s > NEWS_S
+        return heard and state.vehicle_time_s(now_s, self.speed) - self.started_s > self.endurance_s
 
     def _companion_flight(self, state: VehicleState, now_s: float) -> Mode | None:
         if state.companion_silence_s(now_s) > COMPANION_SILENCE_S:

@@ -14,6 +14,7 @@ from gcs.flight.sequence import FleetFlight
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.mission_comparison import first_difference
 from gcs.microservices.mission_download import MissionDownload
+from gcs.planner.flown_plan import NO_FLOWN_PLAN, FlownPlan
 from gcs.planner.plan import FleetPlan
 from gcs.station import Station
 from missions.mission import Mission
@@ -61,7 +62,7 @@ def told_flight(story: Story, station: Station, events: EventLog) -> FleetFlight
     return flight
 
 
-async def _no_planner(mission: Mission) -> FleetPlan:
+async def _no_planner(mission: Mission, flown: FlownPlan = NO_FLOWN_PLAN, /) -> FleetPlan:
     raise FlightAborted(f"{mission.name} is only looked at")
 
 

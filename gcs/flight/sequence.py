@@ -8,6 +8,7 @@ armed on the ground and none in the air without a mode that was chosen for it.
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from gcs.dialect import Mode
 from gcs.errors import CommandRefused, FlightAborted, GcsError, LinkLost, PreflightError
@@ -20,6 +21,7 @@ from gcs.flight.preparation import Preparation
 from gcs.flight.route import RouteWatch
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.flight.vehicle_orders import VehicleOrders
+from gcs.planner.flown_plan import FlownPlan
 from gcs.planner.plan import FleetPlan, VehiclePlan
 from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
@@ -30,8 +32,19 @@ STAGGER_S = 1.0
 """Between two take-offs, in vehicle time."""
 WATCH_INTERVAL_S = 0.05
 
-Planner = Callable[[Mission], Awaitable[FleetPlan]]
 Parts = Iterable[VehicleFlight]
+
+
+class Planner(Protocol):
+    """Makes the cloud's plans."""
+
+    def __call__(self, mission: Mission, flown: FlownPlan = ..., /) -> Awaitable[FleetPlan]:
+        """Plan for a mission, or for what is left of it while something is flown.
+
+        Raises:
+            MissionError: it cannot be planned for.
+        """
+        ...
 
 
 @dataclass

@@ -2,13 +2,16 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 from gcs.errors import UsageError
 from gcs.planner.allocation import allocate
 from gcs.planner.assembly import vehicle_plans
 from gcs.planner.baselines import BASELINES, BaselineSearch
 from gcs.planner.budget import new_budget
+from gcs.planner.flown_plan import NO_FLOWN_PLAN, FlownPlan
 from gcs.planner.plan import FleetPlan, Progress
+from gcs.planner.problem import Way
 from gcs.planner.search import EVERYTHING, FleetSearch, SearchSettings
 from missions.kernels import one_at_a_time
 from missions.mission import Mission, load_mission
@@ -28,6 +31,7 @@ def plan_mission(
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
     settings: SearchSettings = EVERYTHING,
+    flown: FlownPlan = NO_FLOWN_PLAN,
 ) -> FleetPlan:
     """Allocate targets and plan curves and track points for all vehicles of a mission, in its world as it is known.
 
@@ -43,6 +47,7 @@ def plan_mission(
         on_progress: called after every round of the search.
         should_stop: asked often; True ends the search with the best plan so far.
         settings: of `ecpso`, to switch parts of it off.
+        flown: the plan that is being flown: `ecpso` begins with it, besides from nothing, and a change of it costs.
 
     Raises:
         UsageError: there is no such algorithm.
@@ -56,9 +61,11 @@ def plan_mission(
     listener = on_progress or (lambda _: None)
     if algorithm in BASELINES:
         search = BaselineSearch(mission, routes, seed, budget, listener, algorithm)
+        found = search.run()
     else:
-        search = FleetSearch(mission, routes, seed, budget, listener, settings)
-    found = search.run()
+        new_search = partial(FleetSearch, mission, routes, seed, budget, listener, settings, flown)
+        search = _begun(new_search, flown.ways(mission, routes))
+        found = search.improve()
     return FleetPlan(
         mission=mission.name,
         algorithm=algorithm,
@@ -73,6 +80,21 @@ def plan_mission(
         vehicles=vehicle_plans(mission, found),
         staying=tuple(vehicle.name for vehicle in mission.vehicles if vehicle.name not in flying),
     )
+
+
+def _begun(new_search: Callable[..., FleetSearch], ways: list[Way] | None) -> FleetSearch:
+    """The search that has begun best: from nothing, or along the ways that are flown."""
+    if ways is None:
+        search = new_search()
+        search.begin()
+        return search
+    along = new_search()
+    along.begin_along(ways)
+    afresh = new_search(spent=along.evaluations)
+    afresh.begin()
+    better = min(along, afresh, key=lambda search: search.rank)
+    better.count(afresh.evaluations - better.evaluations)
+    return better
 
 
 def compile_kernels() -> None:

@@ -5,7 +5,7 @@ if that looks feasible and better than the best so far, the judge looks at it. W
 the samples that the search looks at, it looks closer from then on and keeps farther away.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from gcs.planner.budget import Budget
 from gcs.planner.cooperation import Cooperation
 from gcs.planner.ecpso import EcpsoSettings
 from gcs.planner.fleet_cost import all_control_points
+from gcs.planner.flown_plan import NO_FLOWN_PLAN, FlownPlan
 from gcs.planner.guide_path import guide_way
 from gcs.planner.plan import Progress
 from gcs.planner.problem import Care, Route, Way, control_points, guides, guides_along, pose
@@ -87,7 +88,7 @@ EVERYTHING = SearchSettings()
 
 @dataclass(frozen=True)
 class Approved:
-    """A plan without violations, and what it costs the search (eq. 13, and what slow flight costs)."""
+    """A plan without violations, and what it costs the search (eq. 13, what slow flight costs, and a change)."""
 
     candidate: Candidate
     cost: float
@@ -103,6 +104,8 @@ class FleetSearch:
         budget: when to end.
         on_progress: called after every round.
         settings: its parts.
+        flown: what is flown meanwhile; plans that differ from it cost more.
+        spent: evaluations that were made before.
     """
 
     def __init__(
@@ -113,12 +116,14 @@ class FleetSearch:
         budget: Budget,
         on_progress: Callable[[Progress], None],
         settings: SearchSettings = EVERYTHING,
+        flown: FlownPlan = NO_FLOWN_PLAN,
+        spent: float = 0.0,
     ) -> None:
         self._mission, self._routes, self._budget, self._on_progress = mission, routes, budget, on_progress
         self._care, self._raises, self._detours = Care(), 0, 0
         self._ways: list[Way | None] = [None] * len(routes)
         self._guides = guides(mission, routes)
-        self._settings = settings
+        self._settings, self._flown, self._spent = settings, flown, spent
         self._problem = pose(mission, routes, self._guides, self._care)
         self._swarms = Cooperation(self._problem, settings.swarm, np.random.default_rng(seed), settings.bows)
         self._present: Refined | None = None
@@ -129,12 +134,41 @@ class FleetSearch:
     @property
     def evaluations(self) -> float:
         """Of whole plans; one vehicle's curve counts as the fleet's share of one."""
-        return self._polishes + self._swarms.curve_evaluations / len(self._routes)
+        return self._spent + self._polishes + self._swarms.curve_evaluations / len(self._routes)
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """How good the best plan so far is, the lower the better: approved ones come before all others."""
+        if self._best is not None:
+            return False, self._best.cost
+        return True, np.inf if self._present is None else self._merit(self._present)
 
     def run(self) -> Candidate:
         """Search until the budget is used up: the best plan that the judge approved, or the least bad one."""
+        self.begin()
+        return self.improve()
+
+    def begin(self) -> None:
+        """Find a first plan, from nothing."""
         self._begin(QUICK)
         self._report()
+
+    def begin_along(self, ways: Sequence[Way]) -> None:
+        """Take the curves along given ways, one for each vehicle, for the first plan."""
+        n_control = control_points(self._mission, ways, POINTS_PER_CORNER)
+        self._guides = guides_along(self._mission, ways, n_control)
+        self._problem = pose(self._mission, self._routes, self._guides, self._care)
+        self._swarms = self._swarms.again(self._problem)
+        self._polish(THOROUGH)
+        self._insist()
+        self._report()
+
+    def count(self, evaluations: float) -> None:
+        """So many were made elsewhere meanwhile."""
+        self._spent += evaluations
+
+    def improve(self) -> Candidate:
+        """Go on from the first plan until the budget is used up; see `run`."""
         while self._budget.share_done(self.evaluations) < 1.0 and not self._budget.interrupted():
             window = self._settings.swarm.window
             if self._budget.left(self.evaluations) > self._swarms.curves_per_round / len(self._routes):
@@ -149,7 +183,10 @@ class FleetSearch:
         if self._best is not None and self._best.cost <= self._present.objective:
             return self._best.candidate
         last = self._judged(self._present.offsets)
-        return last if self._best is None or not last.violations else self._best.candidate
+        if self._best is None:
+            return last
+        is_better = not last.violations and self._cost(self._present, last) < self._best.cost
+        return last if is_better else self._best.candidate
 
     def _begin(self, stages: tuple[Stage, ...]) -> None:
         """The first plan: every vehicle as if it were alone; where that fails, with an eye on the others."""
@@ -204,8 +241,12 @@ class FleetSearch:
             return
         if self._best is None:
             self._budget = self._budget.settled(self.evaluations)
-        if self._best is None or refined.objective < self._best.cost:
-            self._best = Approved(candidate, refined.objective)
+        cost = self._cost(refined, candidate)
+        if self._best is None or cost < self._best.cost:
+            self._best = Approved(candidate, cost)
+
+    def _cost(self, refined: Refined, candidate: Candidate) -> float:
+        return refined.objective + self._flown.change_cost(self._mission, candidate.curves)
 
     def _find_ways_around(self, stuck: BoolArray) -> bool:
         """Give vehicles that cannot even fly alone a guide path around what is in their way, and start afresh.

@@ -93,12 +93,12 @@ class CommandPanel:
             modes = tuple(mode.value for mode in PlanningMode)
             assert desk.flight is not None
             self._mode = gui.add_dropdown("Planned by", modes, initial_value=desk.flight.mode.value)
-            self._mode.on_update(lambda event: self._choose_mode(event.client))
+            self._mode.on_update(self._choose_mode)
         if desk.planner is not None:
             self._algorithm = gui.add_dropdown(
                 "Algorithm", desk.planner.algorithms, initial_value=desk.planner.algorithm
             )
-            self._algorithm.on_update(lambda event: self._choose_algorithm(event.client))
+            self._algorithm.on_update(self._choose_algorithm)
         for intent in (Intent.PLAN, Intent.COMPARE, Intent.CANCEL):
             if intent is not Intent.COMPARE or desk.planner is not None:
                 self._add(intent)
@@ -176,17 +176,22 @@ class CommandPanel:
                 return
         self._presses.ask(Intent.LOAD, event.client, Details(new=NewMission(mission, name, uploaded.content)))
 
-    def _choose_mode(self, client: viser.ClientHandle | None) -> None:
-        """The page's own updates of the dropdown have no client."""
+    async def _choose_mode(self, event: viser.GuiEvent) -> None:
+        """Ask for the mode that was chosen; the page's own updates of the dropdown have no client.
+
+        As a coroutine it is called at once. One of viser's other threads may be late: `_correct` would have been there.
+        """
         assert self._desk.flight is not None
         mode = PlanningMode(self._mode.value)
-        if client is not None and mode is not self._desk.flight.mode:
-            self._presses.ask(Intent.MODE, client, Details(mode=mode))
+        if event.client is not None and mode is not self._desk.flight.mode:
+            self._presses.ask(Intent.MODE, event.client, Details(mode=mode))
 
-    def _choose_algorithm(self, client: viser.ClientHandle | None) -> None:
+    async def _choose_algorithm(self, event: viser.GuiEvent) -> None:
+        """See `_choose_mode`."""
         assert self._desk.planner is not None
-        if client is not None and self._algorithm.value != self._desk.planner.algorithm:
-            self._presses.ask(Intent.ALGORITHM, client, Details(algorithm=self._algorithm.value))
+        algorithm = self._algorithm.value
+        if event.client is not None and algorithm != self._desk.planner.algorithm:
+            self._presses.ask(Intent.ALGORITHM, event.client, Details(algorithm=algorithm))
 
     def _show_planning(self, desk: Desk) -> None:
         assert desk.flight is not None

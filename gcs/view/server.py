@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import hmac
 import logging
 import socket
@@ -56,7 +57,9 @@ async def serve_page(
             await stack.enter_async_context(open_gateway(host, port, token, server.get_port(), secret))
         if first_client is not None:
             _tell_of_first_client(server, loop, first_client)
-        await _keep_up_to_date(Page(server, desk), desk)
+        page = Page(server, desk)
+        spare_the_collector()
+        await _keep_up_to_date(page, desk)
 
 
 def open_server(host: str, port: int, secret: str | None = None) -> viser.ViserServer:
@@ -89,6 +92,15 @@ def open_server(host: str, port: int, secret: str | None = None) -> viser.ViserS
         close_server(server)
         raise _in_use(host, port)
     return server
+
+
+def spare_the_collector() -> None:
+    """Keep what is loaded by now out of the garbage collector's later rounds.
+
+    The libraries behind the page are so large that a whole round takes a tenth of a second, in which nobody flies.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 def close_server(server: viser.ViserServer) -> None:

@@ -206,7 +206,7 @@ class ScriptedDesk:
             unattended=False,
         )
 
-    async def _plan(self, mission: Mission) -> FleetPlan:
+    async def _plan(self, mission: Mission, *_: object) -> FleetPlan:
         for progress in scripted_progress(PLANNING_STEPS):
             self.desk.on_plan_progress(progress)
             await asyncio.sleep(self.planning_s / PLANNING_STEPS)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from playwright.async_api import Page, expect
 
+from gcs.desk.histories import Quantity
 from gcs.desk.intents import NewMission
 from gcs.dialect import COMPANION, Mode, mavlink
 from gcs.planner.plan import FleetPlan
@@ -17,7 +18,7 @@ from missions.tunnel import PayloadType
 from tests.browser.conftest import LARGE, OpenPage
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
-from tests.browser.watching import OUT, button, choose, pixel_of, row, shows, until
+from tests.browser.watching import OUT, button, choose, pixel_of, plots, row, shows, until
 from tests.unit.gcs.messages import frame_of
 
 pytestmark = pytest.mark.browser
@@ -89,7 +90,7 @@ async def test_planning_comparing_editing_and_loading_what_was_edited(open_page:
     desk = scripted.desk
     assert desk.flight is not None
 
-    async def plan(mission: Mission) -> FleetPlan:
+    async def plan(mission: Mission, *_: object) -> FleetPlan:
         await scripted._plan(mission)
         return replace(scripted_plan(mission), algorithm=choice.algorithm)
 
@@ -147,5 +148,8 @@ async def test_several_vehicles_are_clicked_together_their_links_fail_and_what_t
         await until(lambda: len(simulator.ordered) == 2, f"{name} reaches both")
         assert {sysid for sysid, _ in simulator.ordered} == {vehicle.sysid for vehicle in chosen}
         assert all(getattr(fault, "loss", None) == told for _, fault in simulator.ordered)
+    await page.get_by_role("tab", name="Plots").click()
+    await plots(page, len(Quantity))
+    await page.screenshot(path=OUT / "page-plots.png")
     await page.get_by_role("tab", name="Fleet").click()
     await page.screenshot(path=OUT / "page-several.png")

@@ -40,7 +40,7 @@ async def test_the_indoor_mission_is_flown_before_the_operators_eyes(browser: Br
 
 
 async def test_a_flight_whose_ground_station_is_gone_is_watched_by_another_one(browser: Browser, tmp_path: Path):
-    """The operator presses Fly; in mid-flight that ground station is killed, and another one shows what goes on."""
+    """Fly and Hold are pressed, that ground station is killed, and from another one the vehicles are landed."""
     ports, base = (free_port(), free_port()), ["--instance-base", str(INSTANCE_BASE + 10)]
     options = ["--mode", "cloud", "--port", str(ports[0]), *base, "--report", str(tmp_path)]
     async with program("sitl", "indoor", *base):
@@ -50,13 +50,17 @@ async def test_a_flight_whose_ground_station_is_gone_is_watched_by_another_one(b
                 await expect(button(page, "Fly")).to_be_enabled()
                 await button(page, "Fly").click()
                 await expect(page.locator(".gcs-head .phase")).to_have_text("Flying", timeout=FLIGHT_TIMEOUT_MS)
+                await button(page, "Hold").click()
+                await expect(row(page, "interrupted")).to_have_count(2)
                 process.send_signal(signal.SIGKILL)
                 await process.wait()
         async with program("gcs", "watch", "--flight", str(tmp_path), "--port", str(ports[1]), *base):
             await answering(ports[1])
             async with tab(browser, ports[1]) as page:
                 await expect(page.locator(".gcs-head h1")).to_have_text("indoor")
-                await expect(row(page, "flying")).to_have_count(2)
-                await expect(row(page, "Mission")).to_have_count(2)
+                await expect(row(page, "Hold")).to_have_count(2)
+                await expect(row(page, "interrupted")).to_have_count(2)
                 await expect(page.locator(".gcs-overlay .tag.vehicle").first).to_be_visible()
                 assert {"/plan/curves", "/fleet/hull", "/fleet/tails"} <= await scene(page)
+                await button(page, "Land").click()
+                await expect(row(page, "Land")).to_have_count(2)

@@ -17,11 +17,14 @@ from tests.browser.watching import OUT, button, camera_position_m, pixel_of, sho
 
 pytestmark = pytest.mark.browser
 
+VERY_FINE = 1.5
+"""As many pixels per pixel of the window as small screens of high resolution have."""
+
 
 async def test_two_browsers_have_a_camera_each_and_share_everything_else(browser: Browser):
     scripted = ScriptedDesk("indoor")
     await scripted.begin(at_s=[0.3 * part.times_s[-1] for part in scripted_plan(scripted.mission).vehicles])
-    async with serving(scripted) as port, tab(browser, port) as one, tab(browser, port) as other:
+    async with serving(scripted) as port, tab(browser, port, pixels=VERY_FINE) as one, tab(browser, port) as other:
         for page in (one, other):
             await expect(page.locator(".gcs-overlay .tag.vehicle")).to_have_count(2)
             await expect(page.locator(".gcs-overlay .tag", has_text="alpha")).to_contain_text("Offboard · 96 %")
@@ -32,7 +35,7 @@ async def test_two_browsers_have_a_camera_each_and_share_everything_else(browser
             assert box is not None
             at = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
             away = at - await pixel_of(one, vehicle.position_m)
-            assert np.all(np.abs(away) < [100.0, 60.0]), "a tag stands by its vehicle, however coarsely that is drawn"
+            assert np.all(np.abs(away) < [100.0, 60.0]), "a tag stands by its vehicle, however finely that is drawn"
         before_m = await camera_position_m(other)
         await button(one, "Top").click()
         await one.wait_for_timeout(1500)

@@ -87,3 +87,23 @@ async def pixels(page: Page) -> bytes:
         }"""
     )
     return bytes(values)
+
+
+async def plots(page: Page, count: int) -> None:
+    """Wait until so many plots are shown, each with lines in colours: axes and grids are grey."""
+    await page.wait_for_function(
+        """count => {
+            const drawn = Array.from(document.querySelectorAll(".uplot canvas"), canvas => {
+                if (!canvas.width) return false;
+                const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+                let coloured = 0;
+                for (let i = 0; i < data.length; i += 4) {
+                    const rgb = data.slice(i, i + 3);
+                    if (data[i + 3] > 128 && Math.max(...rgb) - Math.min(...rgb) > 60) coloured += 1;
+                }
+                return coloured > 100;
+            });
+            return drawn.length === count && drawn.every(Boolean);
+        }""",
+        arg=count,
+    )

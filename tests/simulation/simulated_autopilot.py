@@ -9,7 +9,7 @@ import msgspec
 from companion.errors import CommandRefused
 from companion.events import AutopilotFound, Event, FlightMode, RingReported, Sender, StartCommanded
 from companion.instructions import CommandResult
-from companion.link.messages import EVENTS_OF, OdometryMessage
+from companion.link.messages import EVENTS_OF, OdometryMessage, TunnelMessage
 from companion.setpoints import Setpoint
 from gcs.dialect import AUTOPILOT, COMPANION, Mode, mavlink
 from gcs.errors import GcsError
@@ -31,7 +31,8 @@ YAW_RATE_IGNORED = 0x800
 ANSWERS = {0, 39, 40, 44, 47, 51, 73, 77}
 """What microservices wait for: mission transfer and COMMAND_ACK; and HEARTBEAT, which says where to send to."""
 EVENTS = {
-    getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in (*EVENTS_OF, "ODOMETRY", "COMMAND_LONG", "OBSTACLE_DISTANCE")
+    getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
+    for name in (*EVENTS_OF, "ODOMETRY", "COMMAND_LONG", "OBSTACLE_DISTANCE", "TUNNEL")
 }
 """What becomes events; everything else is not even decoded."""
 MODES = {
@@ -83,6 +84,8 @@ class SimulatedAutopilot:
                 self._read(message)
             elif message.get_type() == "COMMAND_LONG" and message.command == mavlink.MAV_CMD_MISSION_START:
                 self._events.put_nowait(StartCommanded(Sender(message.get_srcSystem(), message.get_srcComponent())))
+            elif message.get_type() == "TUNNEL":
+                self._read_tunnel(message)
 
     async def open(self) -> None:
         group = asyncio.get_running_loop()
@@ -157,6 +160,11 @@ class SimulatedAutopilot:
 
     def _send(self, message: Any) -> None:
         self._wire.send(self._station.codec.pack(message), ("onboard", self._sysid))
+
+    def _read_tunnel(self, message: Any) -> None:
+        tunnel = msgspec.json.decode(_as_mavsdk_has_it(message), type=TunnelMessage)
+        for event in tunnel.receipt(Sender(message.get_srcSystem(), message.get_srcComponent())):
+            self._events.put_nowait(event)
 
     def _read(self, message: Any) -> None:
         name = message.get_type()

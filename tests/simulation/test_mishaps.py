@@ -6,11 +6,12 @@ from gcs.dialect import Mode
 from gcs.flight.monitor import Phase
 from gcs.flight.report import Flown
 from gcs.settings import PlanningMode
-from missions.faults import CompanionKill, Fault
+from missions.faults import CompanionKill, Fault, LinkFault, SimulatedLink
 from missions.mission import load_mission
 from tests.soak.experiment import fly, runs, work
+from tests.soak.invariants import violations
 from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, Mishap, WallClockJump
-from tests.soak.scenario import draw
+from tests.soak.scenario import Scenario, draw
 from tests.soak.troubled_system import TroubledSystem
 
 INDOOR = load_mission("indoor")
@@ -46,6 +47,40 @@ def test_a_ground_station_that_crashes_before_the_take_off_begins_anew():
     assert system.flight.success, system.error
 
 
+def test_after_a_crash_at_the_take_off_who_hovers_waits_for_the_operator():
+    system = flown(GroundCrash(phase=Phase.TAKING_OFF, after_s=3.0, down_s=2.0))
+    assert system.flight.passive
+    assert "started" not in kinds(system)
+    assert not system.flight.success
+    assert all(flown_by(system, sysid).positions_m[-1, 2] < 0.2 for sysid in system.simulator.vehicles)
+    assert all(part.monitor.reason == "landed by the operator" for part in system.flight.vehicles.values())
+
+
+def test_a_link_that_is_dark_at_first_delays_the_flight():
+    system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1)
+    system.simulator.order(LinkFault(link=SimulatedLink.GROUND, blackout_s=10.0))
+    assert system.fly().success
+    assert system.events.events[0].t_s >= 10.0
+
+
+def test_a_link_that_goes_dark_at_the_take_off_ends_with_all_on_the_ground():
+    system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1)
+    system.simulator.order(LinkFault(link=SimulatedLink.GROUND, blackout_s=60.0, at_s=0.5))
+    report = system.fly()
+    assert report.reason.startswith("take-off broken off: ")
+    assert not any(state.armed and not state.airborne for state in system.station.fleet.vehicles.values())
+    assert "command" in kinds(system)[kinds(system).index("aborted") :]
+
+
+def test_what_the_ground_station_says_to_be_stored_is_looked_up_on_the_vehicle():
+    system = flown()
+    assert kinds(system).count("uploaded") == 2
+    assert not system.false_beliefs
+    system.events.add("uploaded", "another mission than is stored", "alpha", plan_id=77)
+    (belief,) = system.false_beliefs
+    assert "alpha uploaded 0000004d" in belief
+
+
 def test_a_crashed_ground_station_sends_nothing_any_more():
     system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1)
     system.process.ended = True
@@ -70,6 +105,16 @@ def test_a_companion_that_comes_back_does_not_take_over_by_itself():
     landed_s = float(flown_by(system, 1).times_s[flown_by(system, 1).positions_m[:, 2] > 0.3][-1])
     assert [mode for at_s, mode in system.modes[1] if held_s < at_s < landed_s] == [Mode.LAND]
     assert system.flight.vehicles[2].monitor.reached
+
+
+def test_a_vehicle_that_still_moves_at_the_end_is_a_violation():
+    system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1)
+    report = system.fly()
+    scenario = Scenario(PlanningMode.CLOUD, INDOOR, INDOOR, (), ())
+    assert not violations(scenario, system, report)
+    time_s, positions_m, velocities_m_s = system.truth[-1]
+    system.truth.append((time_s, positions_m, velocities_m_s + 2.0))
+    assert [text for text in violations(scenario, system, report) if "still moves at" in text]
 
 
 def test_a_seed_is_one_scenario_and_one_flight_to_the_bit():

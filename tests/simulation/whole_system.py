@@ -27,7 +27,7 @@ from gcs.errors import GcsError
 from gcs.flight.events import EventLog
 from gcs.flight.report import FlightReport, Flown, make_report
 from gcs.flight.sequence import FleetFlight
-from gcs.planner import plan_mission
+from gcs.planner import NO_FLOWN_PLAN, FlownPlan, plan_mission
 from gcs.planner.plan import FleetPlan
 from gcs.settings import PlanningMode
 from gcs.station import Station
@@ -185,8 +185,11 @@ class WholeSystem:
             for index, sysid in enumerate(self.simulator.vehicles)
         }
 
-    async def _plan(self, mission: Mission) -> FleetPlan:
-        plan = planned(msgspec.json.encode(mission), self.seed)
+    async def _plan(self, mission: Mission, flown: FlownPlan = NO_FLOWN_PLAN, /) -> FleetPlan:
+        if flown.curves_m:
+            plan = plan_mission(mission, seed=self.seed, flown=flown)
+        else:
+            plan = planned(msgspec.json.encode(mission), self.seed)
         await asyncio.sleep(CLOUD_PLANNING_TIME_S)
         return plan
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from gcs.errors import GcsError
-from gcs.flight.events import EventLog
+from gcs.flight.events import Event, EventLog
 from gcs.flight.journal import JOURNAL_FILE, JournalKeeper
 from gcs.flight.monitor import Phase
 from gcs.flight.rejoining import rejoin, told_flight, unfinished
@@ -17,6 +17,7 @@ from gcs.flight.sequence import FleetFlight
 from gcs.link.connection import Address, Connection
 from gcs.station import Station
 from missions.mission import Vehicle
+from missions.mission_items import plan_id
 from sitl.simulator import UTC_START_US
 from tests.simulation.whole_system import MOST_WAITING, GroundWire, LidarWire, WholeSystem
 from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, LidarSilence, Mishap, Timed, WallClockJump
@@ -104,6 +105,8 @@ class TroubledSystem(WholeSystem):
     mishaps: tuple[Mishap, ...] = ()
     restarts: list[tuple[float, str]] = field(default_factory=list)
     """(simulated time, what) of everything that came back."""
+    false_beliefs: list[str] = field(default_factory=list)
+    """What the ground station said to be stored, and was not at that moment."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -146,7 +149,7 @@ class TroubledSystem(WholeSystem):
         story, mission = unfinished(self._folder, self.mission), self.mission
         self._journal = JournalKeeper(self._folder / JOURNAL_FILE)
         if not hasattr(self, "events"):
-            self.events = EventLog(asyncio.get_running_loop().time)
+            self.events = EventLog(asyncio.get_running_loop().time, listeners=[self._check_belief])
         if story is not None:
             self.flight = told_flight(story, self.station, self.events)
         else:
@@ -202,6 +205,15 @@ class TroubledSystem(WholeSystem):
             self.faults = tuple(fault for fault in self.faults if fault.vehicle != vehicle.sysid)
             self.restarts.append((self.simulator.time_s, f"companion {vehicle.sysid}"))
             await super()._companion(vehicle)
+
+    def _check_belief(self, event: Event) -> None:
+        """Whoever says that a mission is stored has to be right in this very moment."""
+        if event.kind not in {"uploaded", "swapped"}:
+            return
+        sysid = next(vehicle.sysid for vehicle in self.mission.vehicles if vehicle.name == event.vehicle)
+        stored = plan_id(self.simulator.vehicles[sysid].autopilot.navigator.mission.plan.items)
+        if stored != event.data["plan_id"]:
+            self.false_beliefs.append(f"{event.vehicle} {event.kind} {event.data['plan_id']:08x}, has {stored:08x}")
 
     # ------------------------------------------------------------------- mishaps
     async def _befall(self, mishap: Timed) -> None:

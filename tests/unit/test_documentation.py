@@ -96,11 +96,14 @@ def test_every_equation_of_the_paper_is_found_in_the_code():
 def test_every_test_of_the_fault_matrix_exists():
     table = rows("docs/fault-matrix.md", 5)
     assert len(table) > 20
-    for fault, _, _, shown_by, _ in table:
+    kinds = (ROOT / "docs/results/soak.md").read_text()
+    for fault, _, _, shown_by, soak in table:
         named = re.findall(r"`(tests/[\w/]+\.py)` `(\w+)`", shown_by)
         assert named or shown_by == "none", fault
         for path, name in named:
             assert re.search(rf"^(?:async )?def {name}\b", (ROOT / path).read_text(), re.M), f"{path}: {name}"
+        for kind in re.findall(r"`([\w-]+)`", soak):
+            assert f"| {kind} |" in kinds, f"{fault}: {kind} is not in the last soak"
 
 
 def test_the_mission_of_the_tutorial_is_planned(tmp_path: Path):

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from playwright.async_api import async_playwright
+from playwright.async_api import Browser, async_playwright
 
 from gcs.view.page import Page
-from gcs.view.server import UPDATE_INTERVAL_S, close_server, open_server
+from gcs.view.server import UPDATE_INTERVAL_S, close_server, open_server, spare_the_collector
 from tests.benchmarks.view.circling_fleet import CirclingFleet
 from tests.browser.chromium import ARGUMENTS, find_chromium
 from tests.browser.loopback import HOST, free_port
@@ -48,12 +48,21 @@ class Load:
     slow_bytes_per_s: float
 
 
+@dataclass(frozen=True)
+class Reload:
+    """Until the page is there [s], ours and, just before, one with nothing in it."""
+
+    ours_s: float
+    bare_s: float
+
+
 @asynccontextmanager
 async def kept_page(fleet: CirclingFleet) -> AsyncIterator[Kept]:
     """A page whose vehicles fly on at real time."""
     kept = Kept(free_port())
     server = open_server(HOST, kept.port)
     page = Page(server, fleet.desk)
+    spare_the_collector()
     keeping = asyncio.create_task(_keep(page, fleet, kept))
     try:
         yield kept
@@ -85,24 +94,44 @@ async def load(count: int, seconds: float, *, fast: int, slow: int) -> Load:
         )
 
 
-async def reloads_s(count: int, flown_s: float, times: int) -> list[float]:
-    """From opening a tab to panels, tags and vehicles in it [s], in a flight that has lasted `flown_s` already."""
-    fleet, found = CirclingFleet(count), []
+async def reloads(count: int, flown_s: float, times: int) -> list[Reload]:
+    """Open the page so many times in a flight that has lasted `flown_s` already, each time beside a bare one."""
+    fleet, found = CirclingFleet(count), list[Reload]()
     fleet.have_flown(flown_s, 0.2)
-    async with kept_page(fleet) as kept, async_playwright() as playwright:
+    async with kept_page(fleet) as kept, bare_page() as bare_port, async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=find_chromium(), args=ARGUMENTS)
         try:
             for _ in range(times + 1):
-                tab = await browser.new_page(viewport={"width": 1000, "height": 640})
-                begun_s = time.perf_counter()
-                await tab.goto(f"http://{HOST}:{kept.port}")
-                await tab.wait_for_selector(".gcs-fleet tr", state="attached", timeout=60_000)
-                await tab.wait_for_function("'/fleet/hull' in (window.__viserSceneTree?.getState() ?? {})")
-                found.append(time.perf_counter() - begun_s)
-                await tab.close()
+                bare_s = await _opened_s(browser, bare_port, "/box", "button")
+                found.append(Reload(await _opened_s(browser, kept.port, "/fleet/hull", ".gcs-fleet tr"), bare_s))
         finally:
             await browser.close()
     return found[1:]  # the first one starts the browser's own processes
+
+
+@asynccontextmanager
+async def bare_page() -> AsyncIterator[int]:
+    """The port of a page of viser with a box and a button: what every page of it costs a browser."""
+    port = free_port()
+    server = open_server(HOST, port)
+    server.scene.add_box("/box")
+    server.gui.add_button("button")
+    try:
+        yield port
+    finally:
+        await asyncio.to_thread(close_server, server)
+
+
+async def _opened_s(browser: Browser, port: int, node: str, panel: str) -> float:
+    """From opening a tab to a panel and a node of the scene in it [s]."""
+    tab = await browser.new_page(viewport={"width": 1000, "height": 640})
+    begun_s = time.perf_counter()
+    await tab.goto(f"http://{HOST}:{port}")
+    await tab.wait_for_selector(panel, state="attached", timeout=60_000)
+    await tab.wait_for_function(f"{node!r} in (window.__viserSceneTree?.getState() ?? {{}})", timeout=60_000)
+    lasted_s = time.perf_counter() - begun_s
+    await tab.close()
+    return lasted_s
 
 
 def _rate(client: RawClient, before: int, lasted_s: float) -> float:

@@ -58,7 +58,7 @@ def work(run: Run) -> Row:
         "ground_link_bytes": system.wire.bytes,
         "cloud_replans": report.cloud_replans,
         "swap_s": report.swap_s_p50,
-        "reason": report.reason,
+        "reason": "; ".join((*map(str, system.simulator.collisions), report.reason)),
         "wall_s": round(time.perf_counter() - begun_s, 1),
     }
 

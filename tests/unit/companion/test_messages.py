@@ -12,10 +12,13 @@ from companion.events import (
     MissionReported,
     ModeReported,
     OriginReported,
+    ReceiptHeard,
+    Sender,
     UtcReported,
 )
-from companion.link.messages import EVENTS_OF, CommandLong, OdometryMessage, mode_of
+from companion.link.messages import EVENTS_OF, CommandLong, OdometryMessage, TunnelMessage, mode_of
 from missions.frames import GeodeticPoint
+from missions.tunnel import PayloadType, Receipt, encode_receipt
 
 ODOMETRY = {
     "time_usec": 5136000,
@@ -120,3 +123,28 @@ def test_a_command_says_whom_it_is_for():
     fields = {"command": 300, "target_system": 2, "target_component": 191, "param1": None, "confirmation": 3}
     command = msgspec.json.decode(msgspec.json.encode(fields), type=CommandLong)
     assert (command.command, command.target_system, command.target_component) == (300, 2, 191)
+
+
+GROUND = Sender(255, 190)
+
+
+def tunnel(kind: int, payload: bytes) -> TunnelMessage:
+    fields = {"target_system": 1, "target_component": 191, "payload_type": kind, "payload_length": len(payload)}
+    padded = list(payload.ljust(128, b"\0"))
+    return msgspec.json.decode(msgspec.json.encode({**fields, "payload": padded}), type=TunnelMessage)
+
+
+def test_a_receipt_in_a_tunnel_is_an_event_and_other_payloads_are_none():
+    receipt = Receipt(heard=7, time_boot_ms=4200, age_s=0.125)
+    assert tunnel(PayloadType.RECEIPT, encode_receipt(receipt)).receipt(GROUND) == [ReceiptHeard(GROUND, receipt)]
+    assert tunnel(PayloadType.OCCUPANCY, encode_receipt(receipt)).receipt(GROUND) == []
+
+
+def test_a_receipt_that_cannot_be_read_is_an_error():
+    with pytest.raises(ValueError, match="expected at least"):
+        tunnel(PayloadType.RECEIPT, b"\1").receipt(GROUND)
+    damaged = msgspec.json.encode(
+        {"target_system": 1, "target_component": 191, "payload_type": 0x8054, "payload_length": 1, "payload": [300]}
+    )
+    with pytest.raises(ValueError, match="range"):
+        msgspec.json.decode(damaged, type=TunnelMessage).receipt(GROUND)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from companion.observations import FRAME_BYTES, MOST_BLOCKS, REPEAT_S, Observations
+from companion.report_budget import ReportBudget
 from missions.occupancy import decode_block
 
 LOW_M, HIGH_M = np.array([4.0, 0.0, 0.0]), np.array([14.0, 10.0, 4.0])
@@ -18,7 +19,7 @@ def post(east_m: float = 10.0, north_m: float = 4.0) -> np.ndarray:
 
 
 def observations(budget_bytes_s: float = BUDGET_BYTES_S) -> Observations:
-    return Observations(0.1, budget_bytes_s)
+    return Observations(0.1, ReportBudget(budget_bytes_s))
 
 
 def told(reporter: Observations, now_s: float) -> np.ndarray:
@@ -92,7 +93,7 @@ def test_a_loss_is_made_good_by_repetition():
 
 
 def test_memory_is_bounded():
-    reporter = Observations(1.0, BUDGET_BYTES_S)
+    reporter = Observations(1.0, ReportBudget(BUDGET_BYTES_S))
     rng = np.random.default_rng(0)
     low_m, high_m = np.zeros(3), np.array([2000.0, 2000.0, 900.0])
     reporter.update(rng.uniform((10, 10, 500), (1990, 1990, 890), (4 * MOST_BLOCKS, 3)), low_m, high_m, 1.0)

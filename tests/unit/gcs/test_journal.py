@@ -21,7 +21,7 @@ MISSION = load_mission("indoor")
 TRACK = Track(np.array([[5.0, 6.0, 1.5], [19.0, 8.5, 1.5]]), np.array([3.0, 1.0]))
 
 
-async def no_planner(mission: Mission) -> FleetPlan:
+async def no_planner(mission: Mission, *_: object) -> FleetPlan:
     raise FlightAborted("not here")
 
 

@@ -183,6 +183,25 @@ def test_endurance_ends_a_flight_by_landing():
     assert "endurance" in flight.monitor.reason
 
 
+def test_a_vehicle_that_was_not_heard_for_longer_than_it_may_fly_is_asked_first_whether_it_has_landed():
+    flight = Flight()
+    flight.wait(1.0)
+    for _ in range(400):
+        flight.now_s += 1.0
+        assert flight.monitor.step(flight.state, flight.now_s) is None
+    assert flight.wait(1.0) == []
+    flight.state.landed, flight.state.armed = LandedState.ON_GROUND, False
+    flight.at([TARGET.position_m[0], TARGET.position_m[1], 0.0])
+    assert flight.wait(5.0) == []
+    assert flight.monitor.reached
+
+
+def test_one_that_still_flies_then_is_landed():
+    flight = Flight()
+    flight.now_s += 400.0
+    assert flight.wait(5.0) == [Mode.LAND]
+
+
 def test_holding_at_the_target_is_arrival_where_the_mission_says_so():
     flight = Flight(on_arrival=OnArrival.HOLD)
     flight.at([TARGET.position_m[0] - 3.0, *TARGET.position_m[1:]])

@@ -12,6 +12,7 @@ from gcs.microservices.command_client import CommandClient
 from gcs.microservices.verified_upload import VerifiedUpload
 from gcs.station import Station
 from missions.mission_items import MissionItem
+from missions.tunnel import CompanionState, CompanionStatus, PayloadType, Receipt, decode_receipt, encode_status
 from tests.simulation import virtual_time
 from tests.unit.gcs import messages as mav
 
@@ -321,3 +322,30 @@ def test_what_goes_over_a_narrow_link_keeps_within_its_budget():
         assert len(rig.wires[RADIO].sent) == 60
 
     virtual_time.run(play())
+
+
+def test_a_companion_is_told_how_much_of_what_it_saw_is_heard():
+    async def play() -> list[tuple[int, int, int, Receipt]]:
+        rig = Rig()
+        rig.hear(RADIO, HEARTBEAT)
+        status = encode_status(CompanionStatus(state=CompanionState.FLYING, time_boot_ms=4200))
+        rig.hear(RADIO, tunnel_message(PayloadType.COMPANION_STATUS, status), (1, 191))
+        for _ in range(3):
+            rig.hear(RADIO, tunnel_message(PayloadType.OCCUPANCY, bytes(80)), (1, 191))
+        await asyncio.sleep(0.25)
+        rig.wires[RADIO].sent.clear()
+        beating = asyncio.create_task(rig.station.send_heartbeats())
+        await asyncio.sleep(0.1)
+        beating.cancel()
+        told = [m for frame in rig.wires[RADIO].sent for m in Codec().parse(frame) if m.get_type() == "TUNNEL"]
+        return [
+            (m.target_system, m.target_component, m.payload_type, decode_receipt(bytes(m.payload[: m.payload_length])))
+            for m in told
+        ]
+
+    receipt = Receipt(heard=3, time_boot_ms=4200, age_s=0.25)
+    assert virtual_time.run(play()) == [(1, 191, PayloadType.RECEIPT, receipt)]
+
+
+def tunnel_message(kind: PayloadType, payload: bytes) -> mavlink.MAVLink_tunnel_message:
+    return mavlink.MAVLink_tunnel_message(0, 0, kind, len(payload), list(payload.ljust(128, b"\0")))

@@ -18,13 +18,17 @@ from missions.mission_items import Command, MissionItem, Track, decode_track, en
 from missions.trajectory import Trajectory
 from missions.tunnel import (
     MAX_PAYLOAD_BYTES,
+    RECEIPT_COUNTS,
     CompanionState,
     CompanionStatus,
     Reason,
+    Receipt,
     TrajectoryKind,
     TrajectoryMessage,
+    decode_receipt,
     decode_status,
     decode_trajectory,
+    encode_receipt,
     encode_status,
     encode_trajectory,
 )
@@ -123,6 +127,14 @@ def test_figures_that_are_too_large_are_sent_as_the_largest():
     assert decode_status(encode_status(absurd)).replans == 0xFFFF
 
 
+def test_a_receipt_survives_the_wire_and_its_count_wraps():
+    receipt = Receipt(heard=41, time_boot_ms=123456, age_s=0.25)
+    assert decode_receipt(encode_receipt(receipt)) == receipt
+    wrapped = Receipt(heard=41 + RECEIPT_COUNTS, time_boot_ms=123456 + 2**32, age_s=0.25)
+    assert decode_receipt(encode_receipt(wrapped)) == receipt
+    assert decode_receipt(encode_receipt(Receipt(heard=0, time_boot_ms=0, age_s=1e6))).age_s == pytest.approx(65.535)
+
+
 def trajectory_message(n_points: int = 12) -> TrajectoryMessage:
     points = np.cumsum(np.full((n_points, 3), 0.25), axis=0)
     trajectory = Trajectory(points, start_s=1_700_000_000.25, knot_interval_s=0.4)
@@ -163,7 +175,7 @@ def test_a_trajectory_that_does_not_fit_is_refused():
 
 @given(payload=st.binary(max_size=128))
 def test_random_payloads_decode_or_are_refused_and_nothing_else(payload: bytes):
-    for decode in (decode_status, decode_trajectory):
+    for decode in (decode_status, decode_trajectory, decode_receipt):
         try:
             decode(payload)
         except WireFormatError:

@@ -133,7 +133,7 @@ async def test_a_plan_that_is_made_can_be_cancelled():
     desk = await make_desk(planned=False)
     began, cancelled = asyncio.Event(), asyncio.Event()
 
-    async def plan(mission: Mission) -> FleetPlan:
+    async def plan(mission: Mission, *_: object) -> FleetPlan:
         began.set()
         try:
             await asyncio.Event().wait()
@@ -166,7 +166,7 @@ async def test_algorithms_are_compared_and_the_best_plan_is_taken():
     desk.planner = choice = Choice()
     assert desk.flight is not None
 
-    async def plan(mission: Mission) -> FleetPlan:
+    async def plan(mission: Mission, *_: object) -> FleetPlan:
         worth = {"ecpso": 6.4, "pso": 9.9}[choice.algorithm]
         return FleetPlan(**(vars(scripted_plan(mission)) | {"algorithm": choice.algorithm, "objective": worth}))
 

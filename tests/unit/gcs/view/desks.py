@@ -19,7 +19,7 @@ from tests.unit.gcs import messages as mav
 async def make_desk(mission: str | None = "indoor", *, planned: bool = True, heard: tuple[int, ...] = (1, 2)) -> Desk:
     """A desk at which these vehicles were heard, standing on the mission's first pads."""
 
-    async def planner(loaded: Mission) -> FleetPlan:
+    async def planner(loaded: Mission, *_: object) -> FleetPlan:
         return scripted_plan(loaded)
 
     station, events = Station(), EventLog(time.monotonic)
