@@ -113,7 +113,7 @@ class Flight:
         self._traffic.look(latest, now_s, idle=self.course.reaches_end and self.is_at_rest(now_s))
         meets_s = self._traffic.conflict_s(latest, now_s)
         outlook = self._crew.planner.outlook(latest, now_s)
-        self._conflict_s = min(outlook.lacks_s, meets_s - BRAKES_EARLIER_S)
+        self._conflict_s = min(outlook.lacks_s, outlook.too_fast_s, meets_s - BRAKES_EARLIER_S)
         self._danger_s = min(outlook.dangerous_s, meets_s - BRAKES_EARLIER_S)
         trouble = self._trouble(now_s, odometry_age_s, sensor_silent)
         if trouble is not Reason.NONE and self.holding is Reason.NONE:

@@ -201,7 +201,7 @@ def astar(
                 if reached + left < most_s:
                     cost[other], parents[other] = reached, cell
                     heapq.heappush(queue, (float(reached + GREED * left), int(other)))
-    return _trace(parents, begin, end, lattice, start_m, goal_m), cost[end]
+    return _trace(parents, begin, end, lattice, start_m, goal_m), float(cost[end])
 
 
 @compiled

@@ -90,6 +90,8 @@ class Outlook(NamedTuple):
     """For the first time: reason enough for another plan."""
     dangerous_s: float
     """By more than the reserve, which is more than the map's noise: reason enough to brake."""
+    too_fast_s: float
+    """It passes something faster than it has to: what was not seen yet when it was planned. Another plan slows down."""
 
 
 class Planner:
@@ -195,8 +197,8 @@ class Planner:
         around = self._around(trajectory.at(begin_s).position_m, begin_s, neighbours)
         done = min(max(now_s - trajectory.start_s, 0.0), trajectory.duration_s) / trajectory.knot_interval_s
         control_m, knot_s = trajectory.control_points_m, trajectory.knot_interval_s
-        lacks_s, dangerous_s = first_lack(control_m, knot_s, done, self.limits, around)
-        return Outlook(begin_s + lacks_s, begin_s + dangerous_s)
+        lacks_s, dangerous_s, too_fast_s = first_lack(control_m, knot_s, done, self.limits, around)
+        return Outlook(begin_s + lacks_s, begin_s + dangerous_s, begin_s + too_fast_s)
 
     def may_rest(self, places_m: Array) -> npt.NDArray[np.bool_]:
         """Which of (n, 3) places are clear enough to rest there, as far as is known and was seen."""

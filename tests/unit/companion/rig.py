@@ -52,7 +52,7 @@ class StraightPlanner:
         return self.lay_guide(track, index, start.position_m)
 
     def outlook(self, trajectory: Trajectory, now_s: float) -> Outlook:
-        return Outlook(np.inf, np.inf) if self.clear else Outlook(now_s, now_s)
+        return Outlook(np.inf, np.inf, np.inf) if self.clear else Outlook(now_s, now_s, np.inf)
 
     def brake(self, trajectory: Trajectory, now_s: float) -> Trajectory:
         return brake_along(trajectory, now_s, self.limits.acceleration_m_s2)

@@ -114,22 +114,30 @@ class SeesAhead(StraightPlanner):
     def __init__(self) -> None:
         super().__init__()
         self.blocked: Trajectory | None = None
-        self.conflict_at_s = np.inf
+        self.conflict_at_s = self.too_fast_at_s = np.inf
 
     def outlook(self, trajectory: Trajectory, now_s: float) -> Outlook:
-        at_s = self.conflict_at_s if trajectory is self.blocked else np.inf
-        return Outlook(at_s, at_s)
+        if trajectory is not self.blocked:
+            return Outlook(np.inf, np.inf, np.inf)
+        return Outlook(self.conflict_at_s, self.conflict_at_s, self.too_fast_at_s)
 
 
-def blocked_ahead(in_s: float) -> Rig:
-    """A second and a half on its way, a vehicle whose trajectory turns out to be blocked; it gets no answers."""
+def blocked_ahead(in_s: float = np.inf, too_fast_in_s: float = np.inf) -> Rig:
+    """A second and a half on its way, a vehicle whose trajectory turns out to be bad; it gets no answers."""
     planner = SeesAhead()
     rig = Rig(planner=planner).flying()
     rig.run(1.5)
     assert rig.pilot._flight is not None
     rig.answers_plans, planner.blocked = False, rig.pilot._flight.course.latest
-    planner.conflict_at_s = rig.now_s + in_s
+    planner.conflict_at_s, planner.too_fast_at_s = rig.now_s + in_s, rig.now_s + too_fast_in_s
     return rig
+
+
+def test_too_fast_past_what_was_not_seen_before_it_plans_at_once_but_does_not_brake():
+    rig = blocked_ahead(too_fast_in_s=0.5)
+    happened = rig.run(1.0)
+    assert of(happened, instructions.RequestPlan)
+    assert rig.pilot.state is State.FLYING
 
 
 def test_blocked_ahead_it_plans_at_once_and_flies_on_while_it_could_still_stop():

@@ -201,6 +201,20 @@ def test_the_check_asks_for_what_the_mission_requires_without_the_reserve():
         assert PLANNER.is_clear(Trajectory(control, 0.0, 1.0), 0.0) == clear
 
 
+@pytest.mark.parametrize(("speed_m_s", "too_fast"), [(0.9, False), (2.0, True)])
+def test_the_check_notices_who_passes_something_too_fast_but_gives_the_time_to_brake(speed_m_s: float, too_fast: bool):
+    beside_the_crate = np.linspace([1.0, 4.7, 1.5], [13.0, 4.7, 1.5], 25)
+    control = np.vstack((beside_the_crate, np.tile(beside_the_crate[-1], (2, 1))))
+    trajectory = Trajectory(control, 0.0, 0.5 / speed_m_s)
+    nears_s = 4.5 / speed_m_s
+    for from_s, judged in ((0.0, too_fast), (nears_s + 0.5, too_fast), (trajectory.end_s - 0.1, False)):
+        outlook = PLANNER.outlook(trajectory, from_s)
+        assert outlook.lacks_s == np.inf
+        assert (outlook.too_fast_s < np.inf) == judged
+    braking = PLANNER.brake(trajectory, nears_s + 0.5)
+    assert PLANNER.outlook(braking, braking.start_s + 0.4 * braking.duration_s).too_fast_s == np.inf
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_braking_stays_on_the_path_and_stops_within_the_limits(seed: int):
     rng = np.random.default_rng(seed)
