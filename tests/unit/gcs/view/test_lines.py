@@ -166,7 +166,8 @@ def companion(state: CompanionState = CompanionState.FLYING, revision: int = 1, 
     east = np.concatenate(([0.0, 0.0], np.linspace(0.0, end_m, 6), [end_m, end_m]))
     points_m = np.stack((east, np.zeros(10), np.full(10, 1.5)), axis=1)
     status = CompanionStatus(state=state)
-    return CompanionView(0.0, status, Trajectory(points_m, 1.7e9, 0.5), revision)
+    trajectory = Trajectory(points_m, 1.7e9, 0.5)
+    return CompanionView(heard_s=0.0, status=status, trajectory=trajectory, trajectory_revision=revision)
 
 
 def ahead(companion: CompanionView, vehicle_m: Array, *, now_s: float = 1.0, ways: WaysAhead | None = None) -> Array:
