@@ -87,8 +87,8 @@ def course(name: str, seed: int, world: World, starts_m: Array, goals_m: Array) 
 def room_world(seed: int, movers: tuple[Mover, ...] = ()) -> World:
     """The paper's room; other seeds than 0 move its obstacles by up to 1.5 m and resize them by up to 30 %."""
     rng = np.random.default_rng((seed, 1))
-    shift = rng.uniform(-1.5, 1.5, 4) * (seed > 0)
-    scale = 1.0 + rng.uniform(-0.3, 0.3, 2) * (seed > 0)
+    shift = (rng.uniform(-1.5, 1.5, 4) * (seed > 0)).tolist()
+    scale = (1.0 + rng.uniform(-0.3, 0.3, 2) * (seed > 0)).tolist()
     return World(
         bounds=Bounds(east_m=(0.0, 20.0), north_m=(0.0, 15.0), up_m=(0.0, 4.0)),
         boxes=(
@@ -122,8 +122,8 @@ def dynamic(seed: int) -> Course:
     rng = np.random.default_rng((seed, 2))
     movers = []
     for number, east_m in enumerate((4.0, 9.5, 10.5, 16.0)):
-        low, high, up = rng.uniform(2.0, 4.0), rng.uniform(11.0, 13.0), rng.uniform(1.2, 1.8)
-        ends = [(east_m + rng.uniform(-0.8, 0.8), low, up), (east_m + rng.uniform(-0.8, 0.8), high, up)]
+        low, high, up = (float(rng.uniform(*bounds)) for bounds in ((2.0, 4.0), (11.0, 13.0), (1.2, 1.8)))
+        ends = [(east_m + float(rng.uniform(-0.8, 0.8)), north_m, up) for north_m in (low, high)]
         if rng.random() < 0.5:
             ends.reverse()
         speed_m_s = float(rng.uniform(0.5, 1.5))
