@@ -30,6 +30,8 @@ class FlightLimits(NamedTuple):
     avoidance_m_s: float
     """No plan is faster with less clearance than `avoidance_distance_m`."""
     avoidance_distance_m: float
+    avoidance_reserve_m: float
+    """So much of that is more than the mission asks for."""
     nominal_ratio: float
     """Speed that is aimed at, as a share of the speeds above."""
     acceleration_m_s2: float
@@ -74,10 +76,12 @@ def flight_limits(mission: Mission, reserve: Reserve) -> FlightLimits:
     limits, least_m = mission.limits, reserve.gnss_margin_m if mission.site is Site.OUTDOOR else 0.0
     cap_m, clearance_m = mission.planner.clearance_cap_m, max(limits.clearance_m, limits.body_radius_m)
     avoidance_m = limits.avoidance_distance_m
+    avoidance_reserve_m = max(reserve.distance_share * avoidance_m, least_m)
     return FlightLimits(
         cruise_m_s=limits.cruise_speed_m_s * reserve.limit_share,
         avoidance_m_s=limits.avoidance_speed_m_s * reserve.limit_share,
-        avoidance_distance_m=avoidance_m + max(reserve.distance_share * avoidance_m, least_m),
+        avoidance_distance_m=avoidance_m + avoidance_reserve_m,
+        avoidance_reserve_m=avoidance_reserve_m,
         nominal_ratio=reserve.nominal_share / reserve.limit_share,
         acceleration_m_s2=limits.acceleration_m_s2,
         braking_m_s2=limits.acceleration_m_s2 * reserve.braking_share,

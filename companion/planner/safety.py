@@ -46,7 +46,7 @@ def first_lack(
         points, free_m, step_s, around, ends_of(points[0], control[-1], around, limits), limits, lacking_m, scarce_m
     )
     first_s = dangerous_s = too_fast_s = np.inf
-    near_m = limits.avoidance_distance_m - 0.5 * limits.reserve_m
+    near_m = limits.avoidance_distance_m - limits.avoidance_reserve_m
     begun = points[1] - points[0]
     first_m_s = span(begun[0], begun[1], begun[2]) / step_s if step_s > 0.0 else 0.0
     for i in range(steps + 1):
