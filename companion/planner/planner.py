@@ -130,9 +130,9 @@ class Planner:
             mission.limits.body_radius_m,
         )
         self.voxel_m = mission.onboard.voxel_m
+        self.cell_m = CELLS_PER_VOXEL * self.voxel_m
         self._strictly = False
         """The next guide is led around narrow places as well."""
-        self.cell_m = CELLS_PER_VOXEL * self.voxel_m
 
     @property
     def horizon_m(self) -> float:

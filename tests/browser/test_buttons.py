@@ -149,6 +149,8 @@ async def test_several_vehicles_are_clicked_together_their_links_fail_and_what_t
         assert {sysid for sysid, _ in simulator.ordered} == {vehicle.sysid for vehicle in chosen}
         assert all(getattr(fault, "loss", None) == told for _, fault in simulator.ordered)
     await page.get_by_role("tab", name="Plots").click()
+    for quantity in Quantity:
+        await expect(page.get_by_text(f"{quantity.title} [{quantity.unit}]")).to_be_visible()
     await plots(page, len(Quantity))
     await page.screenshot(path=OUT / "page-plots.png")
     await page.get_by_role("tab", name="Fleet").click()

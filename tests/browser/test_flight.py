@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 from playwright.async_api import Browser, expect
 
+from gcs.desk.histories import Quantity
 from tests.browser.conftest import LARGE, tab
 from tests.browser.ground_station import gcs_fly, program
 from tests.browser.loopback import answering, free_port
-from tests.browser.watching import OUT, button, row, scene
+from tests.browser.watching import OUT, button, plots, row, scene
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
 
@@ -34,6 +35,10 @@ async def test_the_indoor_mission_is_flown_before_the_operators_eyes(browser: Br
             await expect(page.locator(".gcs-overlay .tag.vehicle")).to_have_count(2)
             OUT.mkdir(exist_ok=True)
             await page.screenshot(path=OUT / "page-flown.png")
+            await page.get_by_role("tab", name="Plots").click()
+            for quantity in Quantity:
+                await expect(page.get_by_text(f"{quantity.title} [{quantity.unit}]")).to_be_visible()
+            await plots(page, len(Quantity))
             assert process.returncode is None, "the page goes on after the flight"
     assert process.returncode is not None
     assert (tmp_path / "report.json").exists()
