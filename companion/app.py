@@ -303,3 +303,5 @@ def notice(sensing: Sensing, event: Event, now_s: float) -> None:
             sensing.reframe()
         case events.AutopilotLost():
             sensing.forget()
+        case _:
+            pass

@@ -126,7 +126,7 @@ async def _fly(
     zones_m = np.array([mission.start_m(vehicle), *(target.position_m for target in mission.targets)])
     planner = Planner(mission, settings.reserve, settings.search, np.random.default_rng(settings.seed), zones_m)
     driver = driver_of(settings.sensor, mission)
-    journal.tell("preparing the planner (a fresh machine compiles it once, which takes half a minute)")
+    journal.tell("preparing the planner (a fresh machine compiles it once, which takes a minute or more)")
     with one_at_a_time("companion"):
         warm_up(planner, mission, vehicle)
     give_back_the_compiler()

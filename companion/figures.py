@@ -30,4 +30,4 @@ class Quantiles:
         total = np.cumsum(self._counts)
         if total[-1] == 0:
             return 0.0
-        return float(np.searchsorted(total, share * total[-1])) * self._resolution
+        return float(np.searchsorted(total, share * int(total[-1]))) * self._resolution

@@ -86,7 +86,7 @@ class Note:
     """Write a decision into the log."""
 
     text: str
-    fields: dict[str, Any] = field(default_factory=dict)
+    fields: dict[str, Any] = field(default_factory=dict[str, Any])
 
 
 Instruction = (

@@ -25,7 +25,7 @@ class Journal:
 
     def __init__(self, sysid: int, path: Path | None, say: Callable[[str], None] | None = None) -> None:
         self._sysid = sysid
-        self._say = say or (lambda line: print(line, file=sys.stderr, flush=True))
+        self._say = say or _say_to_stderr
         self._file: TextIO | None = None
         if path is not None:
             try:
@@ -51,3 +51,7 @@ class Journal:
     ) -> None:
         if self._file is not None:
             self._file.close()
+
+
+def _say_to_stderr(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from pathlib import Path
+from typing import cast
 
 from gcs.desk import Desk
 from gcs.desk.desk import PlannerChoice
@@ -15,7 +16,7 @@ from gcs.flight.events import EventLog, Severity
 from gcs.flight.journal import JOURNAL_FILE, JournalKeeper, Story
 from gcs.flight.preflight import origin_here
 from gcs.flight.preparation import CONNECT_TIMEOUT_S
-from gcs.flight.records import read_flown, write_picture, write_report
+from gcs.flight.records import REPORT_FILE, read_flown, write_picture, write_report
 from gcs.flight.rejoining import rejoin
 from gcs.flight.report import FlightReport, Flown
 from gcs.flight.security_watch import SecurityWatch
@@ -242,7 +243,8 @@ class FlightApp:
 
     async def _nobody_takes_over(self) -> bool:
         """Wait for a browser and for its operator; True if the flight is to begin by itself."""
-        self.events.add("page", f"the flight begins when a browser shows it, or in {BROWSER_TIMEOUT_S:g} s")
+        without_s, with_s = f"{BROWSER_TIMEOUT_S:g} s", f"{COUNTDOWN_S:g} s"
+        self.events.add("page", f"the flight begins {with_s} after a browser shows it, or in {without_s} without one")
         if await _is_set(self._first_browser, BROWSER_TIMEOUT_S):
             self.desk.begins_s = self.station.now_s + COUNTDOWN_S
             self.events.add("page", f"the flight begins by itself in {COUNTDOWN_S:g} s, unless an operator takes over")
@@ -323,6 +325,7 @@ class FlightApp:
                 with Unwritten("the flight's picture", self.events.complain):  # drawing takes a second
                     await asyncio.to_thread(write_picture, self.programs.log_dir, self.flight, flown)
                 self.events.add("ended", f"{'success' if self.report.success else 'failed'}: {self.report.reason}")
+                self.events.add("report", f"report: {self.programs.log_dir / REPORT_FILE}")
 
     def _write_report(self, reason: str) -> FlightReport:
         """Write `report.json` and `flight.png`."""
@@ -360,7 +363,7 @@ def _journal(work_dir: Path, events: EventLog) -> JournalKeeper:
         raise UsageError(f"{work_dir}: another ground station is flying with this folder") from None
 
 
-def _first(group: BaseExceptionGroup) -> BaseException:
+def _first(group: BaseExceptionGroup[BaseException]) -> BaseException:
     """The first error of a group, however deeply it is nested."""
     first = group.exceptions[0]
-    return _first(first) if isinstance(first, BaseExceptionGroup) else first
+    return _first(cast(BaseExceptionGroup[BaseException], first)) if isinstance(first, BaseExceptionGroup) else first

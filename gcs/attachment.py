@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 
 from gcs.errors import UsageError
@@ -21,7 +21,7 @@ OTHERS_S = 1.2
 @asynccontextmanager
 async def attached(
     links: Sequence[LinkUrl], ring: KeyRing, say: Callable[[str], None], *, audited: bool = True
-) -> AsyncIterator[Station]:
+) -> AsyncGenerator[Station]:
     """A station on some links until the block ends; what is sent in it are the operator's orders.
 
     Args:

@@ -29,9 +29,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="A MAVLink ground control station for small UAV fleets.",
+    epilog="Begin with `gcs doctor`, then `gcs fly indoor --sim`. `gcs COMMAND --help` has examples.",
 )
-app.command()(fly)
-app.command()(plan)
+app.command(short_help="Fly a mission, simulated or on real vehicles.")(fly)
+app.command(short_help="Plan a mission; nothing is sent to any vehicle.")(plan)
 
 
 @app.command()
@@ -53,11 +54,11 @@ def check(mission: MissionArgument) -> None:
     print(f"  arrival   {loaded.on_arrival.value}")
 
 
-app.command()(watch)
-app.command()(experiment)
+app.command(short_help="Show and command whatever is on the links.")(watch)
+app.command(short_help="Reproduce a table or a figure of the paper.")(experiment)
 
 
-@app.command()
+@app.command(short_help="Say whether this machine is ready to fly.")
 def doctor() -> None:
     """Say whether everything is here that a flight needs, and compile the planner if that is still to be done."""
     from gcs.doctor import examine
@@ -70,6 +71,7 @@ def doctor() -> None:
     began_s = time.perf_counter()
     compile_kernels()
     print(f"ok   planner      compiled and loaded in {time.perf_counter() - began_s:.1f} s")
+    print("ready: gcs fly indoor --sim" if fine else "what is BAD above comes first")
     raise typer.Exit(0 if fine else 1)
 
 
@@ -80,11 +82,11 @@ def missions() -> None:
         print(f"{name:20} {load_mission(name).description}")
 
 
-app.command()(convert)
-app.command()(replay)
-app.command()(links)
-app.add_typer(params_app, name="params")
-app.add_typer(key_app, name="key")
+app.command(short_help="Convert plans, areas and tracks of other tools.")(convert)
+app.command(short_help="Show a recorded flight in the web page.")(replay)
+app.command(short_help="Listen for a while, and say who is heard.")(links)
+app.add_typer(params_app, name="params", short_help="List, set, save and compare parameters.")
+app.add_typer(key_app, name="key", short_help="Signing keys, one per vehicle.")
 
 
 def main() -> None:

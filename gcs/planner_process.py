@@ -13,7 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing.connection import Connection
 from typing import Any
 
-from gcs.planner import ALGORITHMS, NO_FLOWN_PLAN, FlownPlan, plan_mission
+from gcs.planner import ALGORITHMS, NO_FLOWN_PLAN, FlownPlan, compile_kernels, plan_mission
 from gcs.planner.plan import FleetPlan, Progress
 from missions.mission import Mission
 
@@ -47,6 +47,10 @@ class PlannerProcess:
         self._cancelled = context.RawValue(ctypes.c_long, 0)
         work = (self._sender, self._cancelled)
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=work)
+
+    def prepare(self) -> None:
+        """Begin to compile the planner, or to load what was compiled before, beside whatever else is being started."""
+        self._pool.submit(compile_kernels)
 
     async def plan(self, mission: Mission, flown: FlownPlan = NO_FLOWN_PLAN, /) -> FleetPlan:
         """Plan for the whole fleet; when it is cancelled, the search is ended first.

@@ -45,7 +45,7 @@ class FlightPrograms:
     async def start_simulator(self, mission: Mission, mode: PlanningMode) -> tuple[Processes, Child]:
         """Start the simulator; whoever watches it is returned what to watch."""
         settings = self.settings
-        self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in half a minute")
+        self.events.add("process", "starting the simulator; on a fresh machine it is compiled first, in a minute")
         options = ["--seed", str(settings.seed), "--truth", str(self.truth_path)]
         options += ["--signing-key", str(self.keys_path)]
         for fault in settings.simulator_faults:
@@ -57,7 +57,8 @@ class FlightPrograms:
     async def start_companions(self, mission: Mission, mode: PlanningMode) -> tuple[Processes, list[Child]]:
         """Start one companion per vehicle."""
         processes = await self._companions.enter_async_context(Processes(self.log_dir))
-        self.events.add("process", f"starting {len(mission.vehicles)} companions")
+        number = len(mission.vehicles)
+        self.events.add("process", f"starting {number} companions; on a fresh machine they, too, are compiled first")
         children: list[Child] = []
         for vehicle in mission.vehicles:
             name = f"companion-{vehicle.sysid}"

@@ -58,7 +58,7 @@ class Station:
     unix_us: Callable[[], int] = lambda: time.time_ns() // 1000
     fleet: Fleet = field(default_factory=Fleet)
     codec: Codec = field(default_factory=Codec)
-    connections: list[Connection] = field(default_factory=list)
+    connections: list[Connection] = field(default_factory=list[Connection])
     sent: dict[int, int] = field(default_factory=lambda: defaultdict(int))
     """Messages sent to each system."""
     say: Callable[[str], None] = lambda text: None

@@ -10,7 +10,7 @@ import hashlib
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -91,13 +91,13 @@ class KernelsOfUser(_StampedWithImports, UserWideCacheLocator):
 
 
 _LOCATORS = (KernelsWhereOrdered, KernelsBesideSource, KernelsOfUser)
-config.CACHE_LOCATOR_CLASSES = ",".join(  # pyright: ignore[reportAttributeAccessIssue]
+config.CACHE_LOCATOR_CLASSES = ",".join(  # pyright: ignore[reportAttributeAccessIssue] - numba makes its settings at run time
     f"{__name__}.{locator.__name__}" for locator in _LOCATORS
 )
 
 
 @contextmanager
-def one_at_a_time(package: str) -> Iterator[None]:
+def one_at_a_time(package: str) -> Generator[None]:
     """Let one process at a time compile `package`; the others wait and then load what it compiled.
 
     Ten companions that start together on a fresh machine would otherwise all compile the same planner.

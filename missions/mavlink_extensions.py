@@ -35,7 +35,7 @@ def add_extension_fields(dialect: Any) -> None:
             setattr(dialect, base.__name__, extended)
 
 
-def _extended(base: type, fields: list[tuple[str, str]]) -> type:
+def _extended(base: Any, fields: list[tuple[str, str]]) -> type[Any]:
     """A subclass of the message class `base` with `fields` appended; they default to 0."""
     names = [name for name, _ in fields]
     old_names: list[str] = list(base.fieldnames)
@@ -44,7 +44,7 @@ def _extended(base: type, fields: list[tuple[str, str]]) -> type:
         extensions = dict(zip(names, values[len(old_names) :], strict=False))
         extensions |= {name: named.pop(name) for name in names if name in named}
         base.__init__(self, *values[: len(old_names)], **named)
-        self._fieldnames = type(self).fieldnames
+        self._fieldnames = self.fieldnames
         for name in names:
             setattr(self, name, extensions.get(name, 0))
 

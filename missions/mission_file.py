@@ -1,6 +1,7 @@
 """Missions as files that `load_mission` reads back as the same missions."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, cast
 
 import msgspec
 import yaml
@@ -17,5 +18,8 @@ def to_yaml(mission: Mission) -> str:
 
 def _without_none(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _without_none(inner) for key, inner in value.items() if inner is not None}
-    return [_without_none(inner) for inner in value] if isinstance(value, list | tuple) else value
+        fields = cast(dict[str, Any], value)
+        return {key: _without_none(inner) for key, inner in fields.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return [_without_none(inner) for inner in cast(Sequence[Any], value)]
+    return value

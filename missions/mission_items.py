@@ -121,7 +121,10 @@ def decode_track(items: Sequence[MissionItem], frame: LocalFrame, *, ground_offs
     Raises:
         WireFormatError: no waypoint, an item that is not understood, or a number that cannot be flown.
     """
-    points, speeds, seqs, speed_m_s = [], [], [], np.nan
+    points: list[Array] = []
+    speeds: list[float] = []
+    seqs: list[int] = []
+    speed_m_s = np.nan
     for seq, item in enumerate(items):
         match item.command:
             case Command.DO_CHANGE_SPEED:

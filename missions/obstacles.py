@@ -105,7 +105,7 @@ def clearance_at(east: float, north: float, up: float, obstacles: Obstacles) -> 
 def nearest_of(
     east: float, north: float, up: float, boxes: Array, cylinders: Array, threats: Array, peaks: Array
 ) -> float:
-    """`clearance` of one point to what stands in the arrays of `Obstacles`."""
+    """`clearance` [m] of one point to what stands in the arrays of `Obstacles`, whose shapes are said there."""
     nearest = FAR_M
     for i in range(len(boxes)):
         nearest = min(nearest, _to_box(east, north, up, boxes, i))

@@ -92,7 +92,7 @@ class Trajectory:
         )
 
     def grid(self, step_s: float, from_s: float | None = None) -> Array:
-        """Times [s] from `from_s` (or the start) to the end, at most `step_s` apart, the end included."""
+        """(n,) times [s] from `from_s` (or the start) to the end, at most `step_s` apart, the end included."""
         begin = self.start_s if from_s is None else min(max(from_s, self.start_s), self.end_s)
         return np.linspace(begin, self.end_s, max(2, int(np.ceil((self.end_s - begin) / step_s)) + 1))
 

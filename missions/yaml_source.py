@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import msgspec
 import yaml
@@ -22,6 +22,12 @@ _UNKNOWN_FIELD = re.compile(r"unknown field `(?P<name>[^`]*)`")
 
 class _Loader(yaml.SafeLoader):
     """YAML without aliases: a few of them make a small file expand without end."""
+
+    if TYPE_CHECKING:  # the types that PyYAML's stubs leave out
+
+        def check_event(self, *choices: type[yaml.Event]) -> bool: ...
+        def peek_event(self) -> yaml.Event: ...
+        def construct_document(self, node: yaml.Node) -> Any: ...
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
@@ -122,12 +128,12 @@ def _walk(path: Path, node: yaml.Node, key: str, depth: int) -> Iterator[tuple[s
             yield from _walk(path, value, f"{key}[{index}]", depth + 1)
 
 
-def _refuse_not_finite(source: SourceMap, data: Any, key: str) -> None:
+def _refuse_not_finite(source: SourceMap, data: object, key: str) -> None:
     if isinstance(data, dict):
-        for name, value in data.items():
+        for name, value in cast(dict[object, object], data).items():
             _refuse_not_finite(source, value, f"{key}.{name}" if key else str(name))
     elif isinstance(data, list):
-        for index, value in enumerate(data):
+        for index, value in enumerate(cast(list[object], data)):
             _refuse_not_finite(source, value, f"{key}[{index}]")
     elif isinstance(data, float) and not math.isfinite(data):
         raise source.error(key, f"expected a finite number, found {data}")

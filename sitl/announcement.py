@@ -3,7 +3,7 @@
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 from numba.core.event import Event, Listener, install_listener
@@ -28,7 +28,7 @@ class Compilations(Listener):
 
 
 @contextmanager
-def announced_compilation(text: str) -> Iterator[None]:
+def announced_compilation(text: str) -> Generator[None]:
     """Say so while the block compiles, or waits for who does, and for how long already."""
     over, compilations = threading.Event(), Compilations()
     begun_s = time.monotonic()

@@ -88,12 +88,6 @@ def fly(
     if (mission is None) == (vehicles is None):
         raise typer.BadParameter("expected a MISSION or --vehicles, one of the two")
     onboard_port, first_companion_port = _ports(onboard_ports) if onboard_ports else (ONBOARD_PORT, None)
-    lidar = vehicles is None if lidar is None else lidar
-    if lidar and instance_base > HIGHEST_INSTANCE_BASE_WITH_LIDAR:
-        highest = HIGHEST_INSTANCE_BASE_WITH_LIDAR
-        raise typer.BadParameter(
-            f"--instance-base: expected at most {highest} without --no-lidar, found {instance_base}"
-        )
     try:
         settings = Settings(
             speed=speed,
@@ -106,17 +100,32 @@ def fly(
             faults=tuple(parse_simulator_fault(text) for text in fault or ()),
             signing_key=signing_key,
             parameters=parameters,
-            lidar=lidar,
+            lidar=_lidar(lidar, vehicles, instance_base),
             supervised=supervised,
         )
-        flown = _mission(mission, vehicles, origin)
-        files = MemoryFiles(parameters, parameter_table(airframe.airframe)) if parameters else None
-        simulator = warm_simulator(flown, settings, _memories(flown, settings, files))
-        asyncio.run(serve(simulator, settings, files))
+        _simulate(_mission(mission, vehicles, origin), settings)
     except* (MissionError, SitlError, OSError) as problems:
         for problem in problems.exceptions:
             print(f"sitl: {problem}", file=sys.stderr)
         raise typer.Exit(BAD_USAGE) from None
+
+
+def _lidar(asked: bool | None, vehicles: int | None, instance_base: int) -> bool:
+    """Whether lidars are simulated, and their ports fit."""
+    lidar, highest = vehicles is None if asked is None else asked, HIGHEST_INSTANCE_BASE_WITH_LIDAR
+    if lidar and instance_base > highest:
+        raise typer.BadParameter(
+            f"--instance-base: expected at most {highest} without --no-lidar, found {instance_base}"
+        )
+    return lidar
+
+
+def _simulate(mission: Mission, settings: Settings) -> None:
+    """Until it is ended."""
+    table = parameter_table(settings.airframe.airframe)
+    files = MemoryFiles(settings.parameters, table) if settings.parameters else None
+    simulator = warm_simulator(mission, settings, _memories(mission, settings, files))
+    asyncio.run(serve(simulator, settings, files))
 
 
 def main() -> None:

@@ -56,13 +56,20 @@ def wandering(positioning: Positioning, gust_std_m_s: float, interval_s: float) 
 
 
 def set_noise(fleet: np.ndarray, horizontal_m: float, vertical_m: float, velocity_m_s: float) -> None:
-    """Set the standard deviations of the errors of all vehicles in `fleet`."""
+    """Set the standard deviations of the errors of all vehicles in `fleet`, (n,) records of `VEHICLE`."""
     fleet["position_std_m"] = (horizontal_m, horizontal_m, vertical_m)
     fleet["velocity_std_m_s"] = velocity_m_s
 
 
 def start_estimators(fleet: np.ndarray, frame: LocalFrame, positioning: Positioning, rng: np.random.Generator) -> None:
-    """Draw each vehicle's first error and altitude offset, and set its origin where it sees itself standing."""
+    """Draw each vehicle's first error and altitude offset, and set its origin where it sees itself standing.
+
+    Args:
+        fleet: (n,) records of `VEHICLE`, changed in place.
+        frame: the mission's.
+        positioning: how well vehicles know where they are.
+        rng: draws the errors.
+    """
     n = len(fleet)
     fleet["position_error_m"] = rng.standard_normal((n, 3)) * fleet["position_std_m"]
     fleet["velocity_error_m_s"] = rng.standard_normal((n, 3)) * fleet["velocity_std_m_s"][:, None]

@@ -20,6 +20,9 @@ _MAGIC_BYTE = bytes([_MAGIC])
 HEADER_BYTES, OLD_HEADER_BYTES = 10, 6
 """Of MAVLink 2 and 1."""
 
+FieldValues = tuple[float | bytes | tuple[float, ...], ...]
+"""A message's fields in the order of its definition."""
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -117,7 +120,7 @@ def payload_of(message: Message, n_bytes: int) -> bytes:
     return bytes(frame[start : start + min(frame[1], n_bytes)]).ljust(n_bytes, b"\0")
 
 
-def _flat(values: Sequence[Any]) -> list[Any]:
+def _flat(values: Sequence[float | bytes | tuple[float, ...] | list[float]]) -> list[Any]:
     """Arrays among the values opened up."""
     flat: list[Any] = []
     for value in values:
@@ -139,7 +142,7 @@ class FrameReader:
 
     def read(self, datagram: bytes) -> list[Message]:
         """The messages in a datagram, in order; never raises."""
-        messages = self._parser.parse_buffer(datagram) or []
+        messages: list[Message] = self._parser.parse_buffer(datagram) or []
         if self._parser.buf_len():  # a frame that its datagram cut off must not eat the next one
             self.dropped += 1
             self._parser.buf = bytearray()

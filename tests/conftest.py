@@ -1,6 +1,7 @@
 """Browser tests need a Chromium: without one they are left out, loudly, or fail where REQUIRE_BROWSER=1 is set.
 
 Property tests take the same examples in every run of `make test`, and new ones in every run of `make test-all`.
+None has a deadline of wall time: a busy machine is not a defect.
 """
 
 import os
@@ -11,8 +12,8 @@ from hypothesis import settings
 
 from tests.browser.chromium import find_chromium
 
-settings.register_profile("same-examples", derandomize=True, database=None)
-settings.register_profile("new-examples", print_blob=True)
+settings.register_profile("same-examples", derandomize=True, database=None, deadline=None)
+settings.register_profile("new-examples", print_blob=True, deadline=None)
 settings.load_profile("same-examples")
 
 REQUIRED = os.environ.get("REQUIRE_BROWSER") == "1"

@@ -7,12 +7,11 @@ import numpy as np
 
 from companion.events import AutopilotLost, Event, LandedReported, Odometry, UtcReported
 from companion.fleet.exchange import Exchange
+from companion.fleet.neighbour import POSITION_ERROR_M
 from companion.fleet.reports import PositionReport, Report
 from missions.frames import AutopilotFrame
-from missions.mission import Mission, Site
+from missions.mission import Mission
 
-POSITION_ERROR_M = {Site.INDOOR: 0.1, Site.OUTDOOR: 1.0}
-"""What is told of the error of an estimate: about three standard deviations of good positioning."""
 MOST_AT_ONCE = 512
 """Datagrams of one tick: whoever floods the link does not hold up the setpoints."""
 
@@ -63,6 +62,8 @@ class FleetDesk:
                 self.exchange.utc_ahead_s = ahead_s
             case AutopilotLost():
                 self._odometry = self.exchange.utc_ahead_s = None
+            case _:
+                pass
 
     def listen(self, now_s: float) -> None:
         """Take in what has arrived."""

@@ -111,9 +111,6 @@ class Exchange:
         """Announce where this vehicle would go if others were not in its way."""
         self._wanted = self._telling(TrajectoryKind.WANTED, trajectory, plan_id, rank, now_s)
 
-    def stop_wanting(self) -> None:
-        self._wanted = None
-
     def end(self) -> None:
         """Nothing is flown any more that others could rely on."""
         self._flown = self._offered = self._wanted = None

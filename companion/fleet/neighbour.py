@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 
-from missions.mission import Limits
+from missions.mission import Limits, Site
 from missions.trajectory import Trajectory
 from missions.tunnel import TrajectoryKind
+
+POSITION_ERROR_M = {Site.INDOOR: 0.1, Site.OUTDOOR: 1.0}
+"""How far off an estimate of position may be: about three standard deviations of good positioning."""
 
 
 @dataclass(frozen=True)

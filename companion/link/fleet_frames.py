@@ -59,7 +59,7 @@ class FleetFrames:
         if len(datagram) > LARGEST_DATAGRAM_BYTES or datagram[:1] != bytes([MAVLINK_2]):
             self.dropped["no frame"] += 1
             return
-        messages = self._reader.parse_buffer(bytearray(datagram)) or []
+        messages: list[Any] = self._reader.parse_buffer(bytearray(datagram)) or []
         if self._reader.buf_len():  # a frame that its datagram cut off must not eat the next one
             self.dropped["no frame"] += 1
             self._reader.buf, self._reader.buf_index = bytearray(), 0

@@ -49,7 +49,7 @@ def templates(reach_nodes: int) -> Bytes:
     `SATURATED` stands for a distance of `reach_nodes` + 1/4 spacings.
     """
     offsets, grown = np.arange(-reach_nodes, reach_nodes + 2), GROWN_VOXELS / VOXELS_PER_NODE
-    out = []
+    out: list[Array] = []
     for way in range(8):
         parts = [(offsets - (0.75 if way >> axis & 1 else 0.25)) ** 2 for axis in range(3)]
         distance = np.sqrt(parts[0][:, None, None] + parts[1][None, :, None] + parts[2][None, None, :])

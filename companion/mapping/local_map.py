@@ -31,8 +31,6 @@ REBUILT_PER_SCAN = 8
 """Stale blocks that a scan takes out of the field."""
 CERTAIN = 2 * HIT
 """A voxel of this strength was hit by more than one scan: noise and passers-by seldom are."""
-NEIGHBOUR_MARGIN_M = 0.25
-"""What is seen this near to where a neighbour's body should be is the neighbour."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +79,11 @@ class LocalMap:
 
         Args:
             scan: what was seen.
-            others: (k, 4) where the bodies of neighbours are at that time, ENU [m], and their radius [m].
+            others: (k, 4) balls, middle ENU [m] and radius [m], in which neighbours are seen at that time.
         """
         self._recentre(scan.sensor_enu_m)
         points_m = np.ascontiguousarray(scan.points_enu_m, dtype=float)
-        balls = others + np.array([0.0, 0.0, 0.0, NEIGHBOUR_MARGIN_M])
-        kinds = sort_points(points_m, scan.sensor_enu_m, self._body_radius_m, self._known, balls)
+        kinds = sort_points(points_m, scan.sensor_enu_m, self._body_radius_m, self._known, others)
         candidates = np.ascontiguousarray(points_m[kinds == CANDIDATE])
         moving = self._watch.observe(scan.time_s, scan.sensor_enu_m, candidates)
         rays = np.ascontiguousarray(points_m[kinds != NEAR_SELF])

@@ -68,15 +68,16 @@ class Track:
     centre_m: Array
     velocity_m_s: Array
     radius_m: float
-    places: list[tuple[float, Array]] = field(default_factory=list)
+    places: list[tuple[float, Array]] = field(default_factory=list[tuple[float, Array]])
     """Where its centre was measured in the last second, and when."""
     moves: bool = False
 
     def expected_m(self, time_s: float) -> Array:
+        """(3,) where its centre should be at a time, ENU."""
         return self.centre_m + self.velocity_m_s * (time_s - self.time_s)
 
     def follow(self, time_s: float, measured_m: Array, radius_m: float, *, whole: bool) -> None:
-        """Take in where it is now; what is not seen as a whole says little about that."""
+        """Take in where it is now, (3,) ENU; what is not seen as a whole says little about that."""
         step_s = max(time_s - self.time_s, 1e-3)
         expected_m = self.expected_m(time_s)
         off_m = measured_m - expected_m

@@ -49,7 +49,15 @@ def new_archive(capacity: int, dimensions: int) -> Archive:
 
 @compiled
 def offer(archive: Archive, x: Array, value: Array, weights: Array, weighted: bool) -> int:
-    """Offer a feasible candidate to the archive; an `Offer`."""
+    """Offer a feasible candidate (d,) of value (5,) to the archive; an `Offer`.
+
+    Args:
+        archive: changed in place.
+        x: (d,) the candidate.
+        value: (5,) its objectives, then its violations.
+        weights: (3,) of the objectives.
+        weighted: entries are marked by weighted dominance (eqs. 16 and 17), too.
+    """
     values, count = archive.values, archive.n[0]
     mark, n_marked = 0.0, 0.0
     for i in range(count):
@@ -117,7 +125,7 @@ def leader(
 
 @compiled
 def drop_dominated(archive: Archive, value: Array) -> bool:
-    """Remove all entries that `value` Pareto-dominates; whether there were any."""
+    """Remove all entries that a `value` (3 or more,) Pareto-dominates; whether there were any."""
     count, kept = archive.n[0], 0
     for i in range(count):
         if not pareto_dominates(value, archive.values[i]):

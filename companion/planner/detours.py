@@ -161,7 +161,7 @@ def _rejoin(
     while nearest < len(arcs) - 1 and arcs[nearest] - arcs[piece[1]] < _pull_m(limits) and not blocked[nearest + 1]:
         nearest += 1
     next_point = _next_point(guide, nearest)
-    for index in range(int(np.searchsorted(arcs, arcs[a] + horizon_m)), next_point):
+    for index in range(int(np.searchsorted(arcs, float(arcs[a]) + horizon_m)), next_point):
         if index > nearest and not blocked[index]:
             yield index
             break
@@ -172,8 +172,8 @@ def _rejoin(
 def _next_point(guide: Guide, index: int) -> int:
     """Sample of the first track point that is not before a sample."""
     arcs = guide.way.arc_m
-    track = int(np.searchsorted(guide.track_arc_m, arcs[index] - MERGED_M))
-    arc_m = guide.track_arc_m[min(track, len(guide.track_arc_m) - 1)]
+    track = int(np.searchsorted(guide.track_arc_m, float(arcs[index]) - MERGED_M))
+    arc_m = float(guide.track_arc_m[min(track, len(guide.track_arc_m) - 1)])
     return min(int(np.searchsorted(arcs, arc_m - MERGED_M)), len(arcs) - 1)
 
 
@@ -230,9 +230,9 @@ def _pull_m(limits: FlightLimits) -> float:
 
 def _begun_anew(guide: Guide, a: int, b: int, detour: Way) -> Guide:
     """A guide that begins with a detour and goes on behind the b-th sample of the old one."""
-    passed = min(int(np.searchsorted(guide.track_arc_m, guide.way.arc_m[a] + MERGED_M)), len(guide.track_arc_m) - 1)
+    before_m = float(guide.way.arc_m[a])
+    passed = min(int(np.searchsorted(guide.track_arc_m, before_m + MERGED_M)), len(guide.track_arc_m) - 1)
     spliced = _spliced(guide, a, b, detour)
-    before_m = guide.way.arc_m[a]
     way = Way(np.ascontiguousarray(spliced.way.samples[a:]), spliced.way.arc_m[a:] - before_m)
     return Guide(way, spliced.track_arc_m[passed:] - before_m, guide.first_index + passed)
 

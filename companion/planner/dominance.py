@@ -18,7 +18,7 @@ def objective_weights(length: float, clearance: float, height: float) -> Array:
 
 @compiled
 def pareto_dominates(a: Array, b: Array) -> bool:
-    """Eq. 15: `a` is nowhere worse than `b` and somewhere better; the first three of each are compared."""
+    """Eq. 15: `a` is nowhere worse than `b` and somewhere better; the first three of (3 or more,) are compared."""
     better = False
     for i in range(OBJECTIVES):
         if a[i] > b[i]:
@@ -31,7 +31,8 @@ def pareto_dominates(a: Array, b: Array) -> bool:
 def weighted_dominates(a: Array, b: Array, weights: Array) -> bool:
     """Eqs. 16 and 17, with the dominance factors rho_i = 1 - phi_i: heavier objectives tolerate less.
 
-    F_i = f_i(a) - f_i(b) + rho_i * sum over j != i of (f_j(a) - f_j(b)); all at most 0, one below.
+    F_i = f_i(a) - f_i(b) + rho_i * sum over j != i of (f_j(a) - f_j(b)); all at most 0, one below. Values are
+    (3 or more,), the (3,) weights are phi.
     """
     total = 0.0
     for i in range(OBJECTIVES):
@@ -48,13 +49,13 @@ def weighted_dominates(a: Array, b: Array, weights: Array) -> bool:
 
 @compiled
 def dominates(a: Array, b: Array, weights: Array, weighted: bool) -> bool:
-    """The dominance that personal bests are compared by."""
+    """The dominance that personal bests are compared by; values (3 or more,), weights (3,)."""
     return weighted_dominates(a, b, weights) if weighted else pareto_dominates(a, b)
 
 
 @compiled
 def weighted_sum(value: Array, weights: Array) -> float:
-    """The rank of an entry among others: sum of phi_i f_i, the smaller the better."""
+    """The rank of an entry (3 or more,) among others: sum of phi_i f_i with (3,) weights, the smaller the better."""
     total = 0.0
     for i in range(OBJECTIVES):
         total += weights[i] * value[i]
@@ -63,7 +64,7 @@ def weighted_sum(value: Array, weights: Array) -> float:
 
 @compiled
 def is_feasible(value: Array) -> bool:
-    """No constraint is broken, not even a soft one."""
+    """No constraint is broken by a value (5,), not even a soft one."""
     return value[HARD] == 0.0 and value[SOFT] == 0.0
 
 

@@ -141,6 +141,15 @@ def judge_motion(
     """Add by what shares speed, acceleration, climb angle and turn radius exceed their limits.
 
     Who starts too fast, or accelerating too hard, is given the time that it takes to come back to the limits.
+
+    Args:
+        motion: (K + 1, 9) positions [m], velocities [m/s] and accelerations [m/s^2], ENU.
+        free_m: (K + 1,) their clearances.
+        duration_s: of the whole trajectory.
+        start: (3, 3) position, velocity and acceleration to begin with.
+        reference: (K + 1, 8) samples of the reference.
+        limits: of the flight.
+        value: (5,) what is added to.
     """
     n, step_s = len(motion), duration_s / (len(motion) - 1)
     avoidance_m_s, cruise_m_s = limits.avoidance_m_s, limits.cruise_m_s

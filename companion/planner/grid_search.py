@@ -102,7 +102,7 @@ def find_way(
     limits: FlightLimits,
     around: Surroundings,
 ) -> Array:
-    """`way_around`, compiled."""
+    """`way_around`, compiled: between (3,) places; `margin` in cells, at most so many of them, in a sheet if `flat`."""
     low = np.maximum(np.minimum(start_m, goal_m) - room_m, around.room_m[0])
     high = np.minimum(np.maximum(start_m, goal_m) + room_m, around.room_m[1])
     ends, off = ends_of(start_m, goal_m, around, limits), goal_m - start_m

@@ -160,7 +160,8 @@ def _remaining(track: Track, index: int, from_m: Array, limits: FlightLimits) ->
 def dense(vertices: Array, legs_m_s: Array, corridor_m: float, spacing_m: float) -> Way:
     """A way through (v, 3) vertices with (v,) speeds of the legs to them, sampled at least every `spacing_m`."""
     corners = arc_length(vertices)
-    even = np.linspace(0.0, corners[-1], max(int(np.ceil(corners[-1] / spacing_m)), 1) + 1)
+    length_m = float(corners[-1])
+    even = np.linspace(0.0, length_m, max(int(np.ceil(length_m / spacing_m)), 1) + 1)
     arcs = np.unique(np.concatenate((even, corners)))
     points = resample(vertices, corners, arcs)
     leg = np.minimum(np.searchsorted(corners, arcs, side="left"), len(vertices) - 1)

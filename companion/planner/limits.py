@@ -188,7 +188,7 @@ def lacking(
 
 @compiled
 def is_eased(ends: Array, limits: FlightLimits) -> bool:
-    """An end has less than what is required in general."""
+    """An end, of (2, 6) `ends`, has less than what is required in general."""
     lacks, wanted_m = False, limits.clearance_m + limits.reserve_m
     for e in range(2):
         lacks = lacks or ends[e, END_CLEARANCE] < wanted_m or ends[e, END_HEIGHT] < limits.height_m
@@ -221,7 +221,7 @@ def free_space(points_m: Array, step_s: float, around: Surroundings, out: Array)
 
 @compiled
 def outside(points_m: Array, i: int, room_m: Array) -> float:
-    """How far the i-th point is outside of the flight range [m]; 0 within."""
+    """How far the i-th of (n, 3 or more) points is outside of the flight range (2, 3) [m]; 0 within."""
     beyond_m = 0.0
     for axis in range(3):
         beyond_m = max(beyond_m, max(room_m[0, axis] - points_m[i, axis], points_m[i, axis] - room_m[1, axis]))

@@ -150,7 +150,7 @@ def resting_place(way: Way, from_m: float, reach_m: float, limits: FlightLimits,
 
 @compiled
 def pose(start: Array, reference: Reference, planner: LocalPlanner, around: Surroundings) -> LocalProblem:
-    """The problem of finding a trajectory from a state along a reference."""
+    """The problem of finding a trajectory from a state (3, 3) (position, velocity, acceleration) along a reference."""
     shape, n = planner.shape, len(reference.samples)
     return LocalProblem(
         start,
@@ -282,5 +282,5 @@ def _appended(samples: Array, arcs: Array, count: int, leg_m_s: float, corridor_
 
 @compiled
 def apart2(a: Array, b: Array) -> float:
-    """Squared distance of two points."""
+    """Squared distance [m^2] of two (3,) points."""
     return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2

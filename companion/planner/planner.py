@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from companion.fleet.neighbour import Neighbour
+from companion.fleet.neighbour import POSITION_ERROR_M, Neighbour
 from companion.mapping.local_map import LocalMap, View
 from companion.mapping.sorting import Known
 from companion.planner.braking import brake_along
@@ -118,6 +118,8 @@ class Planner:
             search_plan(search, objective_weights(phi.length_weight, phi.clearance_weight, phi.height_weight)),
         )
         self._rng, self._mission_limits = rng, mission.limits
+        self._seen_beside_m = 2.0 * POSITION_ERROR_M[mission.site] + 0.5 * mission.onboard.voxel_m
+        """A neighbour is seen so far from where it says it is: both are wrong about where they are."""
         self._map = LocalMap(
             Known(
                 self.around.obstacles,
@@ -156,7 +158,8 @@ class Planner:
             scan: what was seen.
             neighbours: vehicles that say where they are: they are not mapped.
         """
-        bodies = [(*other.trajectory.at(scan.time_s).position_m, other.radius_m) for other in neighbours]
+        beside_m = self._seen_beside_m
+        bodies = [(*other.trajectory.at(scan.time_s).position_m, other.radius_m + beside_m) for other in neighbours]
         self._map.observe(scan, np.array(bodies, dtype=float).reshape(-1, 4))
 
     @property

@@ -42,6 +42,7 @@ class SplineShape(NamedTuple):
 
     @property
     def modes(self) -> Array:
+        """(f, f): the smooth modes of `layout` [m]."""
         return self.layout[:, 6:]
 
 

@@ -97,7 +97,7 @@ def tabu_step(
 
 @compiled
 def is_tabu(x: Array, memory: TabuMemory, step: Array) -> bool:
-    """`x` lies near a listed optimum."""
+    """A candidate `x` (d,) lies near a listed optimum, in units of the (d,) steps."""
     for i in range(len(memory.listed_at)):
         if memory.listed_at[i] != FREE_SLOT:
             squared = 0.0
@@ -134,7 +134,7 @@ def put_on_list(memory: TabuMemory, iteration: int) -> None:
 
 @compiled
 def go_to(memory: TabuMemory, x: Array, value: Array) -> None:
-    """Go on searching from a candidate of known value."""
+    """Go on searching from a candidate (d,) of known value (5,)."""
     for j in range(len(x)):
         memory.x[j] = x[j]
     for j in range(len(value)):

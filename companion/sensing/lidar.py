@@ -35,7 +35,7 @@ class _Gathering:
     """The latest stamp among its packets."""
     heard_s: float = 0.0
     """Vehicle time when its last packet came in."""
-    packets: dict[int, LidarPacket] = field(default_factory=dict)
+    packets: dict[int, LidarPacket] = field(default_factory=dict[int, LidarPacket])
     """By number."""
 
 

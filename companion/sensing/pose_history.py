@@ -61,7 +61,13 @@ class PoseHistory:
         return self._times_s[-1] if self._times_s else float("-inf")
 
     def add(self, time_s: float, position_ned_m: Array, attitude_ned_frd: Array) -> None:
-        """Take in an estimate; one that comes out of order, or is no rotation, is left out."""
+        """Take in an estimate; one that comes out of order, or is no rotation, is left out.
+
+        Args:
+            time_s: of the vehicle's clock.
+            position_ned_m: (3,) in the autopilot's frame.
+            attitude_ned_frd: (4,) quaternion w, x, y, z, FRD -> NED.
+        """
         length = float(np.linalg.norm(attitude_ned_frd))
         if time_s <= self.newest_s or not 0.5 < length < 2.0:
             return

@@ -1,5 +1,6 @@
-"""Pages of the documentation that are made of the code when the site is built: command lines, the mission file."""
+"""Pages of the documentation that are made of the code when the site is built: programs, mission file, parameters."""
 
+import dataclasses
 import inspect
 import re
 import subprocess
@@ -12,7 +13,14 @@ import msgspec
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
-from missions.mission import Mission
+from companion.fleet.fleet_settings import FleetSettings
+from companion.settings import PilotSettings, Reserve, SearchSettings
+from gcs.flight.safety_parameters import requirements
+from gcs.planner.ecpso import EcpsoSettings
+from gcs.replanning.replanner import ReplanSettings
+from missions.mission import Mission, load_mission
+from sitl.autopilot.parameter_table import parameter_table
+from sitl.dynamics.airframe import X500_LIKE
 
 PROGRAMS = ("gcs", "companion", "sitl")
 
@@ -24,12 +32,40 @@ in these tables are refused, with the line. Positions are metres east, north and
 letters, digits, spaces, `_`, `.` and `-`.
 """
 
+PARAMETERS = """# Parameters
+
+What a user sets stands in the [mission file](mission-file.md) and on the command lines. This page has what lies behind:
+parameters of autopilots, with PX4's names, and the constants of planners and pilot, which are fields of the named class
+in the code and are changed there, with a benchmark beside.
+"""
+
+REQUIRED = """## What a flight requires of an autopilot
+
+Read before arming and, where the mission says `set_parameters: true`, set. Values for the mission `field` at speed 1.
+
+| parameter | value | why |
+|---|---|---|
+"""
+
+SIMULATED = """
+## Of the simulated autopilot
+
+PX4's names, types and defaults, explained in PX4's own parameter reference. Any finite value is stored; applied is the
+value within the range. `gcs params` lists and sets them, `sitl --parameters FOLDER` keeps them.
+
+| parameter | type | default | applied range |
+|---|---|---|---|
+"""
+
+CONSTANTS = (EcpsoSettings, ReplanSettings, Reserve, SearchSettings, PilotSettings, FleetSettings)
+
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the generated pages; the hook that MkDocs calls once it knows the files."""
     for program in PROGRAMS:
         files.append(File.generated(config, f"reference/{program}.md", content=command_line(program)))
     files.append(File.generated(config, "reference/mission-file.md", content=mission_file()))
+    files.append(File.generated(config, "reference/parameters.md", content=parameters()))
     return files
 
 
@@ -42,6 +78,52 @@ def command_line(program: str) -> str:
         text=True,
     )
     return made.stdout
+
+
+def parameters() -> str:
+    """Parameters that are required of autopilots, those of the simulated one, and the constants of our programs."""
+    required = (f"| `{one.name}` | {_bound(one.less_is_fine)}{one.value:g} | {one.why} |" for one in _required())
+    simulated = (
+        f"| `{one.name}` | {'INT32' if isinstance(one.default, int) else 'FLOAT'} | {one.default:.9g} "
+        f"| {one.low:.9g} to {one.high:.9g} |"
+        for one in parameter_table(X500_LIKE)
+    )
+    tables = [PARAMETERS, REQUIRED + "\n".join(required), SIMULATED + "\n".join(simulated) + "\n"]
+    return "\n".join(tables + [_constants(settings) for settings in CONSTANTS])
+
+
+def _required() -> tuple[typing.Any, ...]:
+    return requirements(load_mission("field"), 1.0)
+
+
+def _bound(less_is_fine: bool) -> str:
+    return "at most " if less_is_fine else ""
+
+
+def _constants(settings: type) -> str:
+    """One of our programs' dataclasses of constants."""
+    source = griffe.load(settings.__module__)[settings.__name__]
+    about = f"{inspect.getdoc(settings)}".partition("\n\nArgs:")[0]
+    head = f"## {settings.__name__}\n\n`{settings.__module__}`: {about}\n\n| field | value | |\n|---|---|---|"
+    arguments = _arguments(source)
+    return "\n".join(
+        [head, *(_constant(field, source[field.name], arguments) for field in dataclasses.fields(settings)), ""]
+    )
+
+
+def _arguments(source: griffe.Object | griffe.Alias) -> dict[str, str]:
+    """What a class's docstring says of its fields, where it says it there."""
+    sections = source.docstring.parse("google") if source.docstring else []
+    listed = [section.value for section in sections if section.kind is griffe.DocstringSectionKind.parameters]
+    return {one.name: one.description for group in listed for one in group}
+
+
+def _constant(
+    field: dataclasses.Field[typing.Any], source: griffe.Object | griffe.Alias, arguments: dict[str, str]
+) -> str:
+    meaning = source.docstring.value if source.docstring else arguments.get(field.name, "")
+    meaning = meaning.replace("\n", " ")
+    return f"| `{field.name}` | {field.default} | {meaning} |"
 
 
 def mission_file() -> str:

@@ -88,15 +88,12 @@ def fly(
 
     Exit codes: 0 every vehicle reached its target safely, 1 it did not (the report says why), 2 bad input.
     """
-    if sim and companions:
-        raise UsageError("--sim starts the companions already: give one of --sim and --companions")
     check_access(host, token)
     faults = [_fault(text, simulated=sim) for text in fault or ()]
-    sources = {(True, False): chosen.Autopilots.SIMULATED, (False, True): chosen.Autopilots.COMPANIONS}
     settings = chosen.FlightSettings(
         mission=mission,
         mode=mode,
-        autopilots=sources.get((sim, companions), chosen.Autopilots.ATTACHED),
+        autopilots=_autopilots(sim, companions),
         headless=headless,
         speed=speed,
         seed=seed,
@@ -119,6 +116,14 @@ def fly(
     raise typer.Exit(_run_flight(settings, load_mission(mission)))
 
 
+def _autopilots(sim: bool, companions: bool) -> chosen.Autopilots:
+    if sim and companions:
+        raise UsageError("--sim starts the companions already: give one of --sim and --companions")
+    if sim:
+        return chosen.Autopilots.SIMULATED
+    return chosen.Autopilots.COMPANIONS if companions else chosen.Autopilots.ATTACHED
+
+
 def _fault(text: str, *, simulated: bool) -> Fault | SimulatorFault:
     fault = parse_any_fault(text)
     if isinstance(fault, SimulatorFault) and not simulated:
@@ -137,6 +142,7 @@ def _origin(text: str | None) -> GeodeticPoint | chosen.OriginHere | None:
 def _run_flight(settings: chosen.FlightSettings, mission: Mission, given: "FleetPlan | None" = None) -> int:
     from gcs.console import FlightConsole, PlanConsole
     from gcs.flight.events import BEGAN, EventLog
+    from gcs.flight.records import REPORT_FILE
     from gcs.flight.rejoining import left_in_flight, unfinished
     from gcs.planner_process import PlannerProcess
 
@@ -152,12 +158,14 @@ def _run_flight(settings: chosen.FlightSettings, mission: Mission, given: "Fleet
         if given is not None:
             settings = kept_mission(settings, mission, folder)
         with PlannerProcess("ecpso", settings.seed, [progress.show]) as process:
+            if given is None:
+                process.prepare()
             planner = process if given is None else GivenPlanner(given)
             report = asyncio.run(_fly(settings, mission, planner, events, folder, story))
         events.close()
     verdict = "success" if report.success else "FAILED"
     console.say(f"{verdict}: {report.reason}", style="green" if report.success else "bold red")
-    console.say(f"report: {folder / 'report.json'}")
+    console.say(f"report: {folder / REPORT_FILE}")
     return 0 if report.success else 1
 
 

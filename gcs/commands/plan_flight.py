@@ -20,7 +20,7 @@ class GivenPlanner:
     """Stands where a planner would, with a plan that is there already."""
 
     given: FleetPlan
-    on_progress: list[Callable[[Progress], None]] = field(default_factory=list)
+    on_progress: list[Callable[[Progress], None]] = field(default_factory=list[Callable[[Progress], None]])
 
     async def plan(self, mission: Mission, flown: FlownPlan = NO_FLOWN_PLAN, /) -> FleetPlan:
         """The plan, whatever the mission: it was made from it."""

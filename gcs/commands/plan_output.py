@@ -40,7 +40,8 @@ def write_plan(path: Path, mission: Mission, plan: FleetPlan) -> list[str]:
         return [f"plan: {path}"]
     if not plan.feasible:
         raise UsageError(f"--output {path}: the plan is not feasible; only .json takes one that must not be flown")
-    kind, lines = format_of(path), []
+    kind = format_of(path)
+    lines: list[str] = []
     for part in plan.vehicles:
         document = vehicle_document(mission, plan, part)
         if kind is Format.WAYPOINTS:

@@ -70,8 +70,8 @@ class Change:
 class AlertBoard:
     """All alerts that are going on."""
 
-    alerts: dict[tuple[Alarm, str], Alert] = field(default_factory=dict)
-    changes: list[Change] = field(default_factory=list)
+    alerts: dict[tuple[Alarm, str], Alert] = field(default_factory=dict[tuple[Alarm, str], Alert])
+    changes: list[Change] = field(default_factory=list[Change])
     """Of the last update."""
 
     def update(self, alarms: Iterable[tuple[Alarm, str]], now_s: float) -> None:

@@ -75,7 +75,7 @@ class Desk:
     events: EventLog
     flight: FleetFlight | None = None
     trails: Trails | None = None
-    plan_progress: list[Progress] = field(default_factory=list)
+    plan_progress: list[Progress] = field(default_factory=list[Progress])
     """Of the plan that is being made, or was made last."""
     running: Intent | None = None
     """The step of the whole flight that is under way."""

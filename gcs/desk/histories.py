@@ -42,8 +42,8 @@ QUANTITIES = tuple(Quantity)
 class Histories:
     """One row of all vehicles' quantities per observation."""
 
-    times_s: list[float] = field(default_factory=list)
-    _rows: list[dict[int, tuple[float, ...]]] = field(default_factory=list)
+    times_s: list[float] = field(default_factory=list[float])
+    _rows: list[dict[int, tuple[float, ...]]] = field(default_factory=list[dict[int, tuple[float, ...]]])
 
     def record(self, now_s: float, outlooks: Mapping[int, "Outlook"]) -> None:
         """Take down one observation."""
@@ -59,7 +59,7 @@ class Histories:
         self._rows.clear()
 
     def series(self, quantity: Quantity, sysids: Sequence[int], most: int = 300) -> tuple[Array, ...]:
-        """Times since the first observation [s], then one array per vehicle; NaN where it was not seen.
+        """Times since the first observation [s], then one array per vehicle, all (n,); NaN where it was not seen.
 
         Args:
             quantity: which one.

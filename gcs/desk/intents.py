@@ -34,6 +34,9 @@ class Intent(Enum):
     KILL = "Kill"
     LINK = "Link"
 
+    __hash__ = object.__hash__
+    """One object is one intent; Enum's own hash asks for its name, thousands of times a second for a large fleet."""
+
     @property
     def concerns_vehicles(self) -> bool:
         """It is asked of single vehicles; the others concern the whole flight."""

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 INTERVAL_S = 0.5
+NOT_HEARD = SourceCount()
 NOWHERE = (math.nan, math.nan, math.nan)
 QUALITY_WINDOW = 10
 """Observations over which losses are counted: the last five seconds."""
@@ -61,8 +62,8 @@ class Observations:
 
     histories: Histories = field(default_factory=Histories)
     alerts: AlertBoard = field(default_factory=AlertBoard)
-    outlooks: dict[int, Outlook] = field(default_factory=dict)
-    _counts: dict[int, deque[tuple[int, int]]] = field(default_factory=dict)
+    outlooks: dict[int, Outlook] = field(default_factory=dict[int, Outlook])
+    _counts: dict[int, deque[tuple[int, int]]] = field(default_factory=dict[int, deque[tuple[int, int]]])
     _next_s: float = -math.inf
     _solid: tuple[int, obstacles.Obstacles] | None = None
 
@@ -90,10 +91,11 @@ class Observations:
         sysids, places_m = _places_m(desk)
         if not sysids:
             return {}
-        clear_m = self._clearances_m(desk, places_m)
+        clear_m = self._clearances_m(desk, places_m).tolist()
+        speeds_m_s = np.linalg.norm([desk.vehicles[sysid].velocity_enu_m_s for sysid in sysids], axis=1).tolist()
         return {
-            sysid: self._outlook(desk, sysid, place_m, float(free_m))
-            for sysid, place_m, free_m in zip(sysids, places_m, clear_m, strict=True)
+            sysid: self._outlook(desk, sysid, place_m, speed_m_s, free_m)
+            for sysid, place_m, speed_m_s, free_m in zip(sysids, places_m, speeds_m_s, clear_m, strict=True)
         }
 
     def _clearances_m(self, desk: "Desk", places_m: Array) -> Array:
@@ -105,14 +107,14 @@ class Observations:
         clear_m = obstacles.clearance(places_m, self._solid[1])
         return np.where(clear_m >= obstacles.FAR_M, np.nan, clear_m)
 
-    def _outlook(self, desk: "Desk", sysid: int, place_m: Array, clearance_m: float) -> Outlook:
-        state, part = desk.vehicles[sysid], desk.part(sysid)
+    def _outlook(self, desk: "Desk", sysid: int, place_m: Array, speed_m_s: float, clearance_m: float) -> Outlook:
+        part = desk.part(sysid)
         progress, to_go_m, eta_s = _along(part, place_m) if part is not None else NOWHERE
         return Outlook(
             position_m=place_m,
-            speed_m_s=float(np.linalg.norm(state.velocity_enu_m_s)),
+            speed_m_s=speed_m_s,
             clearance_m=clearance_m,
-            link_quality=self._quality(sysid, desk.station.codec.sources.get((sysid, AUTOPILOT), SourceCount())),
+            link_quality=self._quality(sysid, desk.station.codec.sources.get((sysid, AUTOPILOT), NOT_HEARD)),
             progress=progress,
             to_go_m=to_go_m,
             eta_s=eta_s,
@@ -135,7 +137,7 @@ def _places_m(desk: "Desk") -> tuple[list[int], Array]:
     if desk.trails is None or not seen:
         return [], np.zeros((0, 3))
     sysids = [sysid for sysid, _ in seen]
-    geodetic = np.array([(p.latitude_deg, p.longitude_deg, p.altitude_amsl_m) for _, p in seen if p is not None]).T
+    geodetic = np.array([(p.latitude_deg, p.longitude_deg, p.altitude_amsl_m) for _, p in seen]).T
     parts = [desk.part(sysid) for sysid in sysids]
     offsets_m = np.array([part.monitor.ground_offset_m if part is not None else 0.0 for part in parts])
     return sysids, desk.trails.frame.enu(geodetic[0], geodetic[1], geodetic[2] - offsets_m)

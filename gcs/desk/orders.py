@@ -55,7 +55,7 @@ class OrderBook:
 
     on_change: Callable[[Order], None]
     orders: deque[Order] = field(default_factory=lambda: deque(maxlen=KEPT))
-    _pending: Counter[tuple[Intent, int | None]] = field(default_factory=Counter)
+    _pending: Counter[tuple[Intent, int | None]] = field(default_factory=Counter[tuple[Intent, int | None]])
 
     def enter(self, order: Order) -> Order:
         """Take down a new order."""
@@ -72,7 +72,7 @@ class OrderBook:
 
     def pending(self, intent: Intent, sysid: int | None) -> bool:
         """Whether the same order is under way already."""
-        return self._pending[intent, sysid] > 0
+        return self._pending.get((intent, sysid), 0) > 0
 
 
 def outcome_of(problem: Exception) -> OrderState:

@@ -16,7 +16,7 @@ class CommandSeat:
     """
 
     on_change: Callable[[str], None]
-    present: dict[str, str] = field(default_factory=dict)
+    present: dict[str, str] = field(default_factory=dict[str, str])
     """Key -> name of everybody at the page."""
     holder: str | None = None
     """Key of who is in command."""

@@ -67,7 +67,7 @@ def summary(rows: Sequence[Row]) -> str:
 
 def figures(rows: Sequence[Row], directory: Path) -> list[str]:
     """Medians and quartiles of the best cost, one picture per representation."""
-    drawn = []
+    drawn: list[str] = []
     for representation, most in EVALUATIONS.items():
         name = f"convergence-{representation}.png"
         here = select(rows, representation=representation)

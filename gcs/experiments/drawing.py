@@ -1,6 +1,6 @@
 """Pictures of experiments: no window, small files."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -25,7 +25,7 @@ STYLES = {
 
 
 @contextmanager
-def picture(path: Path, width_in: float, height_in: float) -> Iterator[Figure]:
+def picture(path: Path, width_in: float, height_in: float) -> Generator[Figure]:
     """A matplotlib figure that is written to a PNG file, in few colours, when the block is left."""
     figure = Figure(figsize=(width_in, height_in), dpi=DPI, layout="constrained")
     yield figure

@@ -1,10 +1,11 @@
 """Where runs are done: on this machine's cores, or on a Dask cluster; either is a `concurrent.futures.Executor`."""
 
+import importlib
 import multiprocessing
 import os
 import re
 import signal
-from collections.abc import Iterator
+from collections.abc import Generator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any
@@ -27,7 +28,7 @@ def check_scheduler(url: str) -> None:
     if SCHEDULER.fullmatch(url) is None:
         raise UsageError(f"--executor {url}: expected the address of a Dask scheduler, such as tcp://127.0.0.1:8786")
     try:
-        import distributed  # noqa: F401
+        importlib.import_module("distributed")
     except ImportError:
         raise UsageError(
             f"--executor {url}: dask.distributed is not installed: pip install 'end-cloud-gcs[cluster]'"
@@ -35,7 +36,7 @@ def check_scheduler(url: str) -> None:
 
 
 @contextmanager
-def open_executor(url: str | None) -> Iterator[Executor]:
+def open_executor(url: str | None) -> Generator[Executor]:
     """An executor that ends, with all its work, when the block is left.
 
     Args:
@@ -54,7 +55,7 @@ def open_executor(url: str | None) -> Iterator[Executor]:
 
 
 @contextmanager
-def _process_pool() -> Iterator[Executor]:
+def _process_pool() -> Generator[Executor]:
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(ONE_THREAD)
     context = multiprocessing.get_context("spawn")
@@ -71,7 +72,7 @@ def _process_pool() -> Iterator[Executor]:
 
 
 @contextmanager
-def _cluster(url: str) -> Iterator[Executor]:
+def _cluster(url: str) -> Generator[Executor]:
     from distributed import Client
 
     try:

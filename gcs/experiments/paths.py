@@ -31,7 +31,7 @@ def work(run: Run) -> Row:
     """One search; the plan is kept as samples of all curves, one after the other."""
     outcome = search(MISSION, run)
     curves_m = np.array([curve.curve_m for curve in outcome.candidate.curves])
-    picked = np.linspace(0, curves_m.shape[1] - 1, DRAWN_SAMPLES).round().astype(int)
+    picked = np.linspace(0, len(curves_m[0]) - 1, DRAWN_SAMPLES).round().astype(int)
     return {
         "fvc": outcome.candidate.objective,
         "feasible": not outcome.candidate.violations,

@@ -19,7 +19,7 @@ def draw_world(axes: Any, world: World) -> None:
         world: of peaks and threats.
     """
     low, high = world.bounds.low_enu_m, world.bounds.high_enu_m
-    east, north = np.meshgrid(np.linspace(low[0], high[0], CELLS), np.linspace(low[1], high[1], CELLS))
+    east, north = np.meshgrid(np.linspace(*world.bounds.east_m, CELLS), np.linspace(*world.bounds.north_m, CELLS))
     points = np.stack((east, north, np.zeros_like(east)), axis=-1)
     ground = obstacles.terrain_height(points, obstacles.pack(world))
     axes.plot_surface(east, north, ground, color="tab:green", alpha=0.35, linewidth=0, rcount=CELLS, ccount=CELLS)

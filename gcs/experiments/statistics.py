@@ -54,8 +54,7 @@ def signed_rank_p(one: Sequence[float], other: Sequence[float]) -> float | None:
     differences = np.subtract(one, other)
     if np.count_nonzero(differences) < 2:
         return None
-    _, p = np.asarray(wilcoxon(differences, alternative="two-sided"))
-    return float(p)
+    return float(wilcoxon(differences, alternative="two-sided").pvalue)
 
 
 def significance(p: float | None) -> str:

@@ -92,7 +92,7 @@ def summary(rows: Sequence[Row]) -> str:
 
 def figures(rows: Sequence[Row], directory: Path) -> list[str]:
     """One picture of final objectives per representation."""
-    drawn = []
+    drawn: list[str] = []
     for representation in TITLES:
         name = f"table2-{representation}.png"
         _draw(select(rows, representation=representation), directory / name)
@@ -119,7 +119,7 @@ def _table(rows: Sequence[Row]) -> str:
 def _pooled(rows: Sequence[Row]) -> str:
     """All worlds together, each run against E-CPSO's with the same world and seed."""
     ours = {(row["mission"], row["seed"]): row for row in select(rows, algorithm="ecpso")}
-    lines = []
+    lines: list[list[str]] = []
     for algorithm in ALGORITHMS:
         here = [row for row in select(rows, algorithm=algorithm) if (row["mission"], row["seed"]) in ours]
         rivals = [ours[row["mission"], row["seed"]] for row in here]
@@ -169,7 +169,7 @@ def _cpu_preface() -> str:
 def _cpu_table(rows: Sequence[Row]) -> str:
     contestants = [(SHIPPED, "ecpso")] + [(kind, name) for kind in ("offsets", "absolute") for name in ALGORITHMS]
     head = ["planner"] + [mission.removeprefix("terrain-") for mission in MISSIONS]
-    lines = []
+    lines: list[list[str]] = []
     for representation, algorithm in contestants:
         label = "shipped planner" if representation == SHIPPED else f"{STYLES[algorithm][0]}, {representation}"
         here = select(rows, representation=representation, algorithm=algorithm)

@@ -55,7 +55,7 @@ class Course:
     """
 
     began_s: float = field(default_factory=time.thread_time)
-    steps: list[tuple[float, Progress]] = field(default_factory=list)
+    steps: list[tuple[float, Progress]] = field(default_factory=list[tuple[float, Progress]])
 
     def note(self, progress: Progress) -> None:
         """To be called with every progress."""

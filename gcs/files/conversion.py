@@ -78,7 +78,8 @@ def parse_document(data: bytes, name: str, kind: Format) -> tuple[PlanDocument, 
             return parse_kml(data, name)
         case Format.GEOJSON:
             return parse_geojson(data, name)
-    raise UsageError(f"{name}: a {kind.value} holds no plan")
+        case Format.MISSION | Format.RECORDING:
+            raise UsageError(f"{name}: a {kind.value} holds no plan")
 
 
 def format_document(document: PlanDocument, name: str, kind: Format) -> tuple[str, Notes]:

@@ -1,6 +1,6 @@
 """GeoJSON (RFC 7946): areas in (polygons, their holes as areas to keep out of), plans and flown tracks out."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar, cast
 
 import msgspec
 
@@ -10,6 +10,8 @@ from gcs.files.shapes import Shape, corners_of, shapes_of
 
 MOST_AREAS = 1000
 MOST_DEPTH = 20
+
+T = TypeVar("T")
 
 Position = Annotated[list[float], msgspec.Meta(min_length=2, max_length=4)]
 
@@ -48,36 +50,36 @@ class _Reader:
         self.notes: list[str] = []
         self._name = name
 
-    def read(self, key: str, thing: Any, properties: dict[str, Any], depth: int = 0) -> None:
+    def read(self, key: str, thing: object, properties: dict[str, Any], depth: int = 0) -> None:
         """Take in one object and what is inside of it."""
-        if not isinstance(thing, dict) or not isinstance(thing.get("type"), str) or depth > MOST_DEPTH:
+        found = _object(thing)
+        if not isinstance(found.get("type"), str) or depth > MOST_DEPTH:
             raise BadFile(self._name, key, f"expected a GeoJSON object with a type, found {str(thing)[:40]!r}")
-        match thing["type"]:
+        match found["type"]:
             case "FeatureCollection":
-                self._each(f"{key}.features", thing.get("features"), properties, depth)
+                self._each(f"{key}.features", found.get("features"), properties, depth)
             case "GeometryCollection":
-                self._each(f"{key}.geometries", thing.get("geometries"), properties, depth)
+                self._each(f"{key}.geometries", found.get("geometries"), properties, depth)
             case "Feature":
-                told = thing.get("properties")
-                if thing.get("geometry") is not None:
-                    self.read(f"{key}.geometry", thing["geometry"], told if isinstance(told, dict) else {}, depth + 1)
+                if found.get("geometry") is not None:
+                    self.read(f"{key}.geometry", found["geometry"], _object(found.get("properties")), depth + 1)
             case "Polygon":
-                self._polygon(key, self._rings(key, thing, list[list[Position]]), properties)
+                self._polygon(key, self._rings(key, found, list[list[Position]]), properties)
             case "MultiPolygon":
-                for rings in self._rings(key, thing, list[list[list[Position]]]):
+                for rings in self._rings(key, found, list[list[list[Position]]]):
                     self._polygon(key, rings, properties)
             case "Point" | "MultiPoint" | "LineString" | "MultiLineString" as kind:
                 self.notes.append(f"{key}: a {kind} is no area and is left out")
             case other:
                 raise BadFile(self._name, f"{key}.type", f"expected a type of GeoJSON, found {other[:40]!r}")
 
-    def _each(self, key: str, things: Any, properties: dict[str, Any], depth: int) -> None:
+    def _each(self, key: str, things: object, properties: dict[str, Any], depth: int) -> None:
         if not isinstance(things, list):
             raise BadFile(self._name, key, f"expected a list, found {str(things)[:40]!r}")
-        for index, thing in enumerate(things):
+        for index, thing in enumerate(cast(list[object], things)):
             self.read(f"{key}[{index}]", thing, properties, depth + 1)
 
-    def _rings(self, key: str, thing: dict[str, Any], kind: Any) -> Any:
+    def _rings(self, key: str, thing: dict[str, Any], kind: type[T]) -> T:
         try:
             return msgspec.convert(thing.get("coordinates"), kind)
         except msgspec.ValidationError as wrong:
@@ -95,6 +97,11 @@ class _Reader:
                 self.polygons.append(Polygon(corners=corners_of(places), inclusion=outer and number == 0, name=title))
             except (msgspec.ValidationError, ValueError) as wrong:
                 raise BadFile(self._name, where, f"{wrong}".replace("`", "")) from None
+
+
+def _object(thing: object) -> dict[str, Any]:
+    """A decoded JSON object; an empty one in place of anything else."""
+    return cast(dict[str, Any], thing) if isinstance(thing, dict) else {}
 
 
 def _feature(shape: Shape) -> dict[str, Any]:

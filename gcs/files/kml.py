@@ -61,12 +61,12 @@ class _Reader:
     """Collects polygons while a parser reads."""
 
     name: str
-    polygons: list[Polygon] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    polygons: list[Polygon] = field(default_factory=list[Polygon])
+    notes: list[str] = field(default_factory=list[str])
     is_kml: bool = False
-    _path: list[str] = field(default_factory=list)
+    _path: list[str] = field(default_factory=list[str])
     _title: str = ""
-    _text: list[str] = field(default_factory=list)
+    _text: list[str] = field(default_factory=list[str])
 
     def line(self) -> int:
         """Where the parser is."""

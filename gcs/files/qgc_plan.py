@@ -5,7 +5,7 @@ a complex item without them is refused. https://docs.qgroundcontrol.com/master/e
 """
 
 import math
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import msgspec
 
@@ -24,6 +24,8 @@ from gcs.files.document import (
 )
 from missions.frames import GeodeticPoint
 from missions.mission_items import MAV_FRAME_MISSION, MissionItem
+
+T = TypeVar("T")
 
 PX4, QUADROTOR = 12, 2
 Params = tuple[float | None, float | None, float | None, float | None, float | None, float | None, float | None]
@@ -188,10 +190,10 @@ class _Reader:
         if raw.get("type") != "ComplexItem":
             raise BadFile(self._name, f"{key}.type", f"expected SimpleItem or ComplexItem, found {kind!r}")
         for parent, path in ((raw.get("TransectStyleComplexItem"), "TransectStyleComplexItem.Items"), (raw, "Items")):
-            expanded = parent.get("Items") if isinstance(parent, dict) else None
-            if isinstance(expanded, list) and expanded:
-                keys = [f"{key}.{path}[{index}]" for index in range(len(expanded))]
-                return [(k, self._decoded(k, item, _SimpleItem)) for k, item in zip(keys, expanded, strict=True)]
+            items = cast(dict[str, Any], parent).get("Items") if isinstance(parent, dict) else None
+            if isinstance(items, list) and items:
+                expanded = [(f"{key}.{path}[{index}]", item) for index, item in enumerate(cast(list[object], items))]
+                return [(place, self._decoded(place, item, _SimpleItem)) for place, item in expanded]
         problem = f"the file does not hold the items of this complex item ({kind!r}): expected them in {key}.Items"
         raise BadFile(self._name, key, f"{problem}; it cannot be flown without")
 
@@ -212,7 +214,7 @@ class _Reader:
             raise BadFile(self._name, f"{key}.params[0]", f"expected the doJumpId of an item, found {target}")
         return msgspec.structs.replace(built, param1=float(indices[int(target)]))
 
-    def _decoded(self, key: str, raw: Any, kind: type[_SimpleItem]) -> _SimpleItem:
+    def _decoded(self, key: str, raw: object, kind: type[_SimpleItem]) -> _SimpleItem:
         try:
             return msgspec.convert(raw, kind)
         except msgspec.ValidationError as wrong:
@@ -243,7 +245,7 @@ class _Reader:
             raise BadFile(self._name, key, f"expected a speed in (0, 200] m/s, found {speed_m_s}")
         return speed_m_s
 
-    def _checked(self, key: str, kind: type, **values: Any) -> Any:
+    def _checked(self, key: str, kind: type[T], **values: Any) -> T:
         """A struct from values that may lie outside of what it allows."""
         try:
             return msgspec.convert({name: msgspec.to_builtins(value) for name, value in values.items()}, kind)

@@ -19,7 +19,8 @@ MOST_TRACK_POINTS = 5000
 def mission_area(mission: Mission, plan: FleetPlan | None = None) -> PlanDocument:
     """The fence of a mission: its flight range, and the threats that no curve of the plan passes over."""
     curves_m = [part.curve_m for part in plan.vehicles] if plan is not None else []
-    corners, circles = [], []
+    corners: list[Place] = []
+    circles: list[Circle] = []
     for item in fence_items(mission, curves_m):
         place = Place(item.x / DEG_E7, item.y / DEG_E7)
         if item.command == ItemCommand.FENCE_CIRCLE_EXCLUSION:
@@ -60,7 +61,7 @@ def flown_tracks(path: Path) -> PlanDocument:
         RecordingError: there is nothing whole in it.
     """
     ways = Ways(read_recording(path)).by_sysid
-    tracks = []
+    tracks: list[Way] = []
     for sysid, way in sorted(ways.items()):
         geodetic = way.geodetic[:: 1 + len(way.records) // MOST_TRACK_POINTS]
         points = tuple(

@@ -17,7 +17,7 @@ MAX_VEHICLES = 254
 class Fleet:
     """The vehicles that were heard; a vehicle exists from its autopilot's first heartbeat on."""
 
-    vehicles: dict[int, VehicleState] = field(default_factory=dict)
+    vehicles: dict[int, VehicleState] = field(default_factory=dict[int, VehicleState])
     observed: ObservedMap = field(default_factory=ObservedMap)
     """What their companions have seen."""
 

@@ -12,7 +12,7 @@ class FloodGate:
     window_s: float
     held_back: int = 0
     """Since the beginning."""
-    _recent_s: deque[float] = field(default_factory=deque)
+    _recent_s: deque[float] = field(default_factory=deque[float])
 
     def admits(self, now_s: float) -> bool:
         """Whether one more is let through now."""

@@ -33,7 +33,7 @@ class StatusText:
 class _Chunks:
     begun_s: float
     severity: int
-    parts: dict[int, str] = field(default_factory=dict)
+    parts: dict[int, str] = field(default_factory=dict[int, str])
     last: int | None = None
 
     @property
@@ -55,8 +55,8 @@ class StatusTexts:
 
     repeated: int = 0
     """Texts left out because they had just been shown."""
-    _chunks: dict[int, _Chunks] = field(default_factory=dict)
-    _shown_s: dict[tuple[int, str], float] = field(default_factory=dict)
+    _chunks: dict[int, _Chunks] = field(default_factory=dict[int, _Chunks])
+    _shown_s: dict[tuple[int, str], float] = field(default_factory=dict[tuple[int, str], float])
     _gates: dict[bool, FloodGate] = field(
         default_factory=lambda: {urgent: FloodGate(MOST_PER_WINDOW, WINDOW_S) for urgent in (True, False)}
     )

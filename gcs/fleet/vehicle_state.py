@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -103,7 +104,7 @@ class VehicleState:
             if now_s - self.telemetry_s > LINK_GAP_S:
                 self.link_since_s = now_s
             self.telemetry_s = now_s
-            handler = _HANDLERS.get(message.get_type())
+            handler = self._HANDLERS.get(message.get_type())
             if handler is not None:
                 handler(self, message, now_s)
 
@@ -153,6 +154,8 @@ class VehicleState:
                 received = tunnel.decode_trajectory(payload)
                 self.companion.trajectory = received.trajectory
                 self.companion.trajectory_revision = received.revision
+            case _:
+                pass
 
     def _heartbeat(self, message: Message, now_s: float) -> None:
         self.heard_s = now_s
@@ -200,18 +203,17 @@ class VehicleState:
     def _clock(self, message: Message, now_s: float) -> None:
         self.boot_time_s, self.boot_heard_s = message.time_boot_ms / 1000.0, now_s
 
-
-_HANDLERS: dict[str, Callable[[VehicleState, Message, float], None]] = {
-    "HEARTBEAT": VehicleState._heartbeat,
-    "EXTENDED_SYS_STATE": VehicleState._extended_state,
-    "SYS_STATUS": VehicleState._sys_status,
-    "GLOBAL_POSITION_INT": VehicleState._global_position,
-    "ATTITUDE_QUATERNION": VehicleState._attitude_quaternion,
-    "ATTITUDE": VehicleState._attitude,
-    "HOME_POSITION": VehicleState._home,
-    "MISSION_CURRENT": VehicleState._mission_current,
-    "STATUSTEXT": VehicleState._status_text,
-}
+    _HANDLERS: ClassVar[dict[str, Callable[["VehicleState", Message, float], None]]] = {
+        "HEARTBEAT": _heartbeat,
+        "EXTENDED_SYS_STATE": _extended_state,
+        "SYS_STATUS": _sys_status,
+        "GLOBAL_POSITION_INT": _global_position,
+        "ATTITUDE_QUATERNION": _attitude_quaternion,
+        "ATTITUDE": _attitude,
+        "HOME_POSITION": _home,
+        "MISSION_CURRENT": _mission_current,
+        "STATUSTEXT": _status_text,
+    }
 
 
 def _place(latitude_e7: int, longitude_e7: int, altitude_mm: int) -> GeodeticPoint | None:

@@ -69,7 +69,7 @@ class CloudLoop:
     flight: "FleetFlight"
     replans: int = 0
     """Plans that were made in flight and flown."""
-    swaps_s: list[float] = field(default_factory=list)
+    swaps_s: list[float] = field(default_factory=list[float])
     """From the moment a cause was noticed to the companion's word that it flies the new plan; vehicle time."""
 
     def __post_init__(self) -> None:

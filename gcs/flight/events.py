@@ -51,8 +51,8 @@ class EventLog:
 
     clock: Callable[[], float]
     path: Path | None = None
-    events: list[Event] = field(default_factory=list)
-    listeners: list[Callable[[Event], None]] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list[Event])
+    listeners: list[Callable[[Event], None]] = field(default_factory=list[Callable[[Event], None]])
     keep: bool = False
 
     def __post_init__(self) -> None:

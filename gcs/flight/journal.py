@@ -103,8 +103,8 @@ class Story:
 
     began: Began
     planned: Planned | None = None
-    items: dict[int, tuple[MissionItem, ...]] = field(default_factory=dict)
-    progress: dict[int, Progressed] = field(default_factory=dict)
+    items: dict[int, tuple[MissionItem, ...]] = field(default_factory=dict[int, tuple[MissionItem, ...]])
+    progress: dict[int, Progressed] = field(default_factory=dict[int, Progressed])
     ended: bool = False
 
     @property
@@ -127,6 +127,8 @@ class Story:
                 self.progress[record.sysid] = record
             case Ended():
                 self.ended = True
+            case Began():
+                pass
 
     def restore(self, flight: FleetFlight) -> None:
         """Put a flight where this one was left; nothing is sent."""

@@ -28,7 +28,9 @@ from missions.tunnel import CompanionState
 Array = npt.NDArray[np.float64]
 
 CONNECT_TIMEOUT_S = 240.0
-"""Wall clock; on a fresh machine the companions first compile their planner."""
+"""Until an autopilot is heard, wall clock; on a fresh machine the simulator is first compiled."""
+COMPANION_TIMEOUT_S = 480.0
+"""Until its companion is, from then on: it compiles for longer, and a busy machine takes four times as long."""
 
 SETTLING_S, READY_TIMEOUT_S = 3.0, 60.0
 """A vehicle that is not ready after the first of them is asked why, and given until the second."""
@@ -66,7 +68,7 @@ class Preparation(Operation):
         if self.mode.needs_companions:
             what = f"no companion of vehicle {sysid} heard; start one, or fly with --mode cloud"
             await self.station.wait_until(
-                lambda: fleet[sysid].companion_online(self.station.now_s), CONNECT_TIMEOUT_S, what
+                lambda: fleet[sysid].companion_online(self.station.now_s), COMPANION_TIMEOUT_S, what
             )
             self.events.add("companion", "companion heard", vehicle.name)
         await self._request_streams(vehicle)

@@ -10,6 +10,8 @@ from gcs.flight.sequence import FleetFlight
 from gcs.flight.trails import Trails
 from gcs.unwritten import Unwritten
 
+REPORT_FILE = "report.json"
+
 
 def read_flown(truth_path: Path | None, trails: Trails) -> dict[int, Flown]:
     """What each vehicle has flown, by system id: the simulator's truth if there is one, else what the fleet said."""
@@ -25,7 +27,7 @@ def write_report(
     ends_s = [float(part.times_s[-1]) for part in flown.values() if len(part.times_s)]
     report = make_report(flight, flown, reason=reason, wall_s=wall_s, sim_s=max(ends_s, default=0.0))
     with Unwritten("the report", flight.events.complain):
-        (folder / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
+        (folder / REPORT_FILE).write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
     return report
 
 

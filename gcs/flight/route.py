@@ -26,7 +26,7 @@ class RouteWatch:
     stops: tuple[Target, ...]
     tolerance_m: float
     stop_items: tuple[int, ...] = ()
-    passed: set[str] = field(default_factory=set)
+    passed: set[str] = field(default_factory=set[str])
     """Names of the stops that the vehicle has come to."""
     _last_m: Array | None = None
     _last_s: float = 0.0

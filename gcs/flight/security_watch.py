@@ -28,9 +28,11 @@ class SecurityWatch:
 
     station: Station
     events: EventLog
-    names: dict[int, str] = field(default_factory=dict)
-    _trust: dict[int, Trust] = field(default_factory=dict)
-    _told: dict[tuple[int, Refusal], tuple[int, float]] = field(default_factory=dict)
+    names: dict[int, str] = field(default_factory=dict[int, str])
+    _trust: dict[int, Trust] = field(default_factory=dict[int, Trust])
+    _told: dict[tuple[int, Refusal], tuple[int, float]] = field(
+        default_factory=dict[tuple[int, Refusal], tuple[int, float]]
+    )
 
     def look(self, now_s: float) -> None:
         """Tell what is new since the last call."""

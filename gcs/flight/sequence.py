@@ -8,7 +8,7 @@ armed on the ground and none in the air without a mode that was chosen for it.
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from gcs.dialect import Mode
 from gcs.errors import CommandRefused, FlightAborted, GcsError, LinkLost, PreflightError
@@ -27,6 +27,8 @@ from gcs.security.audit import Origin, acting_as
 from gcs.settings import PlanningMode
 from gcs.station import Station
 from missions.mission import Mission
+
+T = TypeVar("T")
 
 STAGGER_S = 1.0
 """Between two take-offs, in vehicle time."""
@@ -72,9 +74,9 @@ class FleetFlight:
     """Nothing is commanded but what an operator orders: after a restart in flight."""
     plan: FleetPlan | None = None
     """What is flown."""
-    candidates: dict[str, FleetPlan] = field(default_factory=dict)
+    candidates: dict[str, FleetPlan] = field(default_factory=dict[str, FleetPlan])
     """What each algorithm has made of this mission last."""
-    vehicles: dict[int, VehicleFlight] = field(default_factory=dict)
+    vehicles: dict[int, VehicleFlight] = field(default_factory=dict[int, VehicleFlight])
 
     def __post_init__(self) -> None:
         self.cloud = CloudLoop(self)
@@ -293,7 +295,7 @@ class FleetFlight:
             await self.orders.break_off(flight, reason)
 
 
-async def _for_all(step: Callable[..., Awaitable[None]], parts: Iterable[object]) -> None:
+async def _for_all(step: Callable[[T], Awaitable[None]], parts: Iterable[T]) -> None:
     """Do one step for all vehicles at once; the first failure cancels the others and is raised as it is."""
     try:
         async with asyncio.TaskGroup() as group:

@@ -19,11 +19,12 @@ MAX_SAMPLES = 200_000
 class Trail:
     """One vehicle's way: times of its own clock [s], ENU positions [m] and velocities [m/s]."""
 
-    times_s: list[float] = field(default_factory=list)
-    _positions_m: list[Array] = field(default_factory=list)
-    _velocities_m_s: list[Array] = field(default_factory=list)
+    times_s: list[float] = field(default_factory=list[float])
+    _positions_m: list[Array] = field(default_factory=list[Array])
+    _velocities_m_s: list[Array] = field(default_factory=list[Array])
 
     def append(self, time_s: float, position_m: Array, velocity_m_s: Array) -> None:
+        """Add a sample, (3,) ENU [m] and [m/s]; of a flight that is too long, the end is left out."""
         if len(self.times_s) >= MAX_SAMPLES:
             return
         self.times_s.append(time_s)
@@ -49,7 +50,7 @@ class Trails:
     """All vehicles' ways."""
 
     frame: LocalFrame
-    by_sysid: dict[int, Trail] = field(default_factory=dict)
+    by_sysid: dict[int, Trail] = field(default_factory=dict[int, Trail])
 
     def sample(self, fleet: Fleet, ground_offset_m: dict[int, float]) -> None:
         """Take down where every vehicle is, once per new position; all at once: one by one takes long."""

@@ -43,7 +43,7 @@ class Codec:
     system: int = GCS_SYSTEM
     component: int = GCS_COMPONENT
     malformed: int = 0
-    sources: dict[tuple[int, int], SourceCount] = field(default_factory=dict)
+    sources: dict[tuple[int, int], SourceCount] = field(default_factory=dict[tuple[int, int], SourceCount])
     signing: Signing = field(default_factory=Signing)
 
     def __post_init__(self) -> None:

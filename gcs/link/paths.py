@@ -53,7 +53,7 @@ class Path:
     """The system's clock when this one's was 0, from its newest telemetry."""
     hardware_id: int | None = None
     _marks: deque[tuple[float, int, int]] = field(default_factory=lambda: deque(maxlen=16))
-    _pings: dict[int, float] = field(default_factory=dict)
+    _pings: dict[int, float] = field(default_factory=dict[int, float])
 
     def hear(self, seq: int, now_s: float) -> None:
         self.heard_s = now_s
@@ -88,7 +88,7 @@ class Path:
 class SystemPaths(Generic[PathKey]):
     """All ways to one system."""
 
-    paths: dict[PathKey, Path] = field(default_factory=dict)
+    paths: dict[PathKey, Path] = field(default_factory=dict[PathKey, Path])
     chosen: PathKey | None = None
     changes: int = 0
     """How often another path was chosen."""

@@ -27,9 +27,9 @@ class Routes:
     say: Callable[[str], None]
     ignored: int = 0
     """Messages of a second vehicle with a system id that is taken, or of nobody."""
-    _systems: dict[int, SystemPaths[Way]] = field(default_factory=dict)
-    _chosen_s: dict[int, float] = field(default_factory=dict)
-    _named: set[tuple[object, ...]] = field(default_factory=set)
+    _systems: dict[int, SystemPaths[Way]] = field(default_factory=dict[int, SystemPaths[Way]])
+    _chosen_s: dict[int, float] = field(default_factory=dict[int, float])
+    _named: set[tuple[object, ...]] = field(default_factory=set[tuple[object, ...]])
 
     def heard(self, message: Message, way: Way, now_s: float) -> bool:
         """Take note of where a message came from; whether it is to be believed."""

@@ -70,10 +70,6 @@ class CommandClient(Microservice):
     peer: tuple[int, int]
     done: bool = False
     deadline_s: float = math.inf
-    in_progress: bool = False
-    """The other side has said that it is at work."""
-    progress_percent: int | None = None
-    """How far, where it says so."""
     wants: frozenset[str] = frozenset({"COMMAND_ACK"})
     _confirmation: int = 0
     _backoff: Backoff = field(default_factory=lambda: Backoff(FIRST_TIMEOUT_S, ATTEMPTS))
@@ -91,8 +87,6 @@ class CommandClient(Microservice):
         if message.command != self.command.number or self.done:
             return []
         if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
-            self.in_progress = True
-            self.progress_percent = message.progress if message.progress <= 100 else None
             self.deadline_s = now_s + PROGRESS_TIMEOUT_S
             return []
         self.done = True

@@ -58,16 +58,13 @@ class MissionDownload(Microservice):
     peer: tuple[int, int]
     mission_type: int = MISSION
     link: LinkEstimate = field(default_factory=LinkEstimate)
-    items: list[MissionItem] = field(default_factory=list)
+    items: list[MissionItem] = field(default_factory=list[MissionItem])
     opaque_id: int = 0
     """What the vehicle calls the plan; 0 if it has no name for it."""
     done: bool = False
     deadline_s: float = math.inf
     wants: frozenset[str] = frozenset({"MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK"})
     turn: str | None = MISSION_TURN
-    requests_sent: int = 0
-    items_received: int = 0
-    """Item messages, copies included."""
 
     def __post_init__(self) -> None:
         self._round_trip: RoundTrip = self.link.round_trip()
@@ -107,7 +104,8 @@ class MissionDownload(Microservice):
                 return self._item(message, now_s)
             case "MISSION_ACK":
                 return self._acknowledgement(message.type, now_s)
-        return []
+            case _:
+                return []
 
     def handle_timeout(self, now_s: float) -> list[Message]:
         if now_s - self._heard_s > PATIENCE_S:
@@ -158,7 +156,6 @@ class MissionDownload(Microservice):
 
     def _item(self, message: Message, now_s: float) -> list[Message]:
         seq, walk = message.seq, self._pass
-        self.items_received += 1
         self._heard_s = now_s
         if walk is None or seq >= walk.next_seq:
             return []  # not asked for in this pass
@@ -199,7 +196,6 @@ class MissionDownload(Microservice):
     def _request(self, walk: "_Pass", seq: int, copies: int, now_s: float) -> list[Message]:
         walk.in_flight[seq] = _InFlight(now_s, copies)
         walk.next_seq = max(walk.next_seq, seq + 1)
-        self.requests_sent += copies
         return [mavlink.MAVLink_mission_request_int_message(*self.peer, seq, self.mission_type)] * copies
 
     def _stalled(self, walk: "_Pass", now_s: float) -> list[Message]:
@@ -285,11 +281,11 @@ class _Pass:
     begun_s: float
     next_seq: int = 0
     """The item to be requested next."""
-    in_flight: dict[int, _InFlight] = field(default_factory=dict)
+    in_flight: dict[int, _InFlight] = field(default_factory=dict[int, _InFlight])
     """Requested, and their answer may still come."""
     heard_s: float = -math.inf
     highest_answered: int = -1
-    answers: set[int] = field(default_factory=set)
+    answers: set[int] = field(default_factory=set[int])
     tries: int = 0
     """Repetitions of the last request since the last answer."""
 

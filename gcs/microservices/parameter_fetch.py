@@ -14,7 +14,6 @@ from gcs.microservices import Backoff, Microservice
 from gcs.microservices.parameter_client import Value, decode
 
 HASH_CHECK = "_HASH_CHECK"
-NO_INDEX = 65535
 QUIET_S = 0.5
 """A stream of parameters that pauses so long has ended."""
 AT_ONCE = 20
@@ -59,7 +58,7 @@ class ParameterFetch(Microservice):
     deadline_s: float = math.inf
     wants: frozenset[str] = frozenset({"PARAM_VALUE"})
     turn: str | None = "parameters"
-    _found: dict[int, tuple[str, Parameter]] = field(default_factory=dict)
+    _found: dict[int, tuple[str, Parameter]] = field(default_factory=dict[int, tuple[str, Parameter]])
     _count: int | None = None
     _hash: int | None = None
     _rounds: Backoff = field(default_factory=lambda: Backoff(QUIET_S, ROUNDS))

@@ -61,11 +61,16 @@ def route_of(mission: Mission, vehicle: Vehicle, targets: tuple[Target, ...]) ->
 
 
 def one_each(table_m: Array) -> list[list[int]]:
-    """At most one target per vehicle, as many as there can be, the lengths in total least (Kuhn and Munkres)."""
+    """At most one target per vehicle, as many as there can be, the lengths in total least (Kuhn and Munkres).
+
+    Args:
+        table_m: (vehicles + targets, targets) lengths of the ways from every start and target to every target.
+    """
     n_vehicles = len(table_m) - table_m.shape[1]
     routes: list[list[int]] = [[] for _ in range(n_vehicles)]
-    for vehicle, target in zip(*linear_sum_assignment(table_m[:n_vehicles]), strict=True):
-        routes[vehicle].append(int(target))
+    vehicles, targets = linear_sum_assignment(table_m[:n_vehicles])
+    for vehicle, target in zip(vehicles, targets, strict=True):
+        routes[int(vehicle)].append(int(target))
     return routes
 
 

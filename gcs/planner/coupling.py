@@ -110,7 +110,7 @@ def mean_distance(a_m: Array, b_m: Array) -> float:
 
 @compiled
 def add_mean_gradient(a_m: Array, b_m: Array, scale: float, by_a: Array, by_b: Array) -> None:
-    """Add `scale` times the derivatives of `mean_distance`."""
+    """Add `scale` times the derivatives of `mean_distance` to (k, 3) `by_a` and `by_b`."""
     last = len(a_m) - 1
     for k in range(last + 1):
         weight = scale / last * (0.5 if k in (0, last) else 1.0) / max(_distance(a_m, k, b_m, k), 1e-9)

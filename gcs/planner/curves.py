@@ -39,9 +39,8 @@ def _sampled(controls_m: Array, spacing_m: float, table: int) -> Array:
     knots = bspline.clamped_knots(controls_m.shape[1])
     curves_m = np.empty((len(controls_m), count, 3))
     for curve_m, control_m, along_m in zip(curves_m, controls_m, flown_m, strict=True):
-        curve_m[:] = BSpline(knots, control_m, bspline.DEGREE)(
-            np.interp(np.linspace(0.0, along_m[-1], count), along_m, u)
-        )
+        even_m = np.linspace(0.0, float(along_m[-1]), count)
+        curve_m[:] = BSpline(knots, control_m, bspline.DEGREE)(np.interp(even_m, along_m, u))
         curve_m[0], curve_m[-1] = control_m[0], control_m[-1]
     return curves_m
 

@@ -256,7 +256,7 @@ def _separations(mission: Mission, vehicles: Sequence[TimedCurve], fleet: _Fleet
             place, time_s = fleet.places_m[i, k], float(fleet.times_s[k])
             found_m = float(np.linalg.norm(place - fleet.places_m[j, k + later]))
             later_s = fleet.times_s[k + later] - time_s
-            where = f"{_at(place, time_s)}, to {vehicles[j].name}" + (
+            where = f"{_at(place, time_s)}, to {vehicles[int(j)].name}" + (
                 f" {later_s:.1f} s later" if later_s > 0.0 else ""
             )
             yield Violation(vehicles[i].name, Limit.SEPARATION, where, found_m, found_m + missing_m)
@@ -281,7 +281,7 @@ def _may_meet(mission: Mission, fleet: _Fleet, ahead: int) -> list[IntArray]:
     reach_m = (
         max(mission.limits.separation_m, 2.0 * mission.limits.body_radius_m) + (2 * COARSE_STRIDE + ahead) * step_m
     )
-    found = []
+    found: list[IntArray] = []
     for i, own_m in enumerate(places_m):
         begin = i + 1 if ahead == 1 else 0
         near = lengths(places_m[begin:] - own_m).min(axis=1) <= reach_m

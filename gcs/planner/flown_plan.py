@@ -30,7 +30,7 @@ class FlownPlan:
         curves_m: by system id, (m, 3) ENU samples; vehicles without one have none to keep to.
     """
 
-    curves_m: Mapping[int, Array] = field(default_factory=dict)
+    curves_m: Mapping[int, Array] = field(default_factory=dict[int, Array])
 
     def ways(self, mission: Mission, routes: Sequence[Route]) -> list[Way] | None:
         """Along the curves for those whose curve leads through their targets, else straight; None if all are straight.

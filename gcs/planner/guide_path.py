@@ -118,7 +118,9 @@ def _cell_m(mission: Mission) -> Array:
 def _graph(cells: IntArray, shape: IntArray, free: BoolArray, cell_m: Array) -> csr_array:
     """Distances between neighbouring free cells, both ways."""
     strides = np.array([shape[1] * shape[2], shape[2], 1])
-    starts, ends, weights = [], [], []
+    starts: list[IntArray] = []
+    ends: list[IntArray] = []
+    weights: list[Array] = []
     for step in STEPS:
         there = cells + np.array(step)
         inside = np.flatnonzero(free & np.all((there >= 0) & (there < shape), axis=1))
@@ -126,7 +128,7 @@ def _graph(cells: IntArray, shape: IntArray, free: BoolArray, cell_m: Array) -> 
         both = free[reached]
         starts.append(inside[both])
         ends.append(reached[both])
-        weights.append(np.full(np.count_nonzero(both), np.linalg.norm(cell_m * step)))
+        weights.append(np.full(np.count_nonzero(both), float(np.linalg.norm(cell_m * step))))
     ij = (np.concatenate(starts + ends), np.concatenate(ends + starts))
     return csr_array((np.concatenate(weights + weights), ij), shape=(len(cells), len(cells)))
 

@@ -124,7 +124,7 @@ def downhill(gradient: Array, steps: Array, turns: Array, known: int, direction:
 
 @compiled
 def inner(a: Array, b: Array) -> float:
-    """The inner product, without the threads of a linear algebra library."""
+    """The inner product of two (d,) vectors, without the threads of a linear algebra library."""
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]

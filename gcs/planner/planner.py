@@ -58,7 +58,7 @@ def plan_mission(
     budget = new_budget(evaluations, budget_s, clock, should_stop)
     routes = allocate(mission)
     flying = {route.name for route in routes}
-    listener = on_progress or (lambda _: None)
+    listener: Callable[[Progress], None] = on_progress or (lambda _: None)
     if algorithm in BASELINES:
         search = BaselineSearch(mission, routes, seed, budget, listener, algorithm)
         found = search.run()

@@ -45,7 +45,7 @@ def balanced_routes(table_m: Array) -> Routes:
 
 
 def route_length(table_m: Array, vehicle: int, n_vehicles: int, route: list[int]) -> float:
-    """Length [m] of one route."""
+    """Length [m] of one route by a table of lengths (see `balanced_routes`)."""
     before = [vehicle, *(n_vehicles + target for target in route)]
     return float(table_m[before[:-1], route].sum())
 

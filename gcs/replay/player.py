@@ -26,7 +26,7 @@ class Player:
     """
 
     recording: Recording
-    on_seek: list[Callable[[], None]] = field(default_factory=list)
+    on_seek: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
     fleet: Fleet = field(default_factory=Fleet)
     """State of all vehicles at `position_s`."""
     position_s: float = 0.0

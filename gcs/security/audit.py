@@ -7,7 +7,7 @@ answered. Files are appended to, never rewritten.
 
 import os
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -38,15 +38,13 @@ class Origin(Enum):
     """The watch over a flight, when something has gone wrong."""
     REPLANNER = "replanner"
     """The cloud's planner, in flight."""
-    CLIENT = "client"
-    """Another program."""
 
 
 _acting: ContextVar[Origin] = ContextVar("acting", default=Origin.SEQUENCE)
 
 
 @contextmanager
-def acting_as(origin: Origin) -> Iterator[None]:
+def acting_as(origin: Origin) -> Generator[None]:
     """Whatever is sent inside of the block, and by tasks that are begun in it, is this one's order."""
     before = _acting.set(origin)
     try:
@@ -100,7 +98,7 @@ class Audit:
     write: Callable[[bytes], None]
     unix_us: Callable[[], int]
     _next_id: int = 1
-    _pending: dict[Key, _Pending] = field(default_factory=dict)
+    _pending: dict[Key, _Pending] = field(default_factory=dict[Key, _Pending])
 
     def sent(self, message: Message, sysid: int) -> None:
         """A message goes out; if it is an order, it is noted before it does."""

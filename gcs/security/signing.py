@@ -65,7 +65,7 @@ class VehicleKey:
     key: bytes | None = None
     next_key: bytes | None = None
     timestamp: int = 0
-    streams: dict[Stream, int] = field(default_factory=dict)
+    streams: dict[Stream, int] = field(default_factory=dict[Stream, int])
 
     @property
     def trust(self) -> Trust:

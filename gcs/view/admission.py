@@ -30,9 +30,9 @@ class Admission:
     """
 
     token: str
-    _sessions: OrderedDict[str, float] = field(default_factory=OrderedDict)
+    _sessions: OrderedDict[str, float] = field(default_factory=OrderedDict[str, float])
     """Session -> when it ends [s]."""
-    _wrong: OrderedDict[str, list[float]] = field(default_factory=OrderedDict)
+    _wrong: OrderedDict[str, list[float]] = field(default_factory=OrderedDict[str, list[float]])
     """Address -> times of its wrong tokens [s]."""
 
     def enter(self, address: str, offered: str, now_s: float) -> str | None:

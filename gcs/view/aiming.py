@@ -1,6 +1,7 @@
 """Sending vehicles to a place that is clicked at in the scene."""
 
 from collections.abc import Callable, Iterable
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -49,10 +50,12 @@ class Aiming:
         """
 
         def click(event: viser.SceneClickEvent) -> None:
-            client.scene.remove_click_callback()
+            stop_listening()
             self._go(event.client, np.array(event.ray_origin), np.array(event.ray_direction))
 
-        client.scene.remove_click_callback()
+        # what such a callback returns is left open by viser
+        stop_listening = cast(Callable[[], None], client.scene.remove_click_callback)  # pyright: ignore[reportUnknownMemberType]
+        stop_listening()
         client.scene.on_click()(click)
         client.add_notification(
             "Click at the place", "The selected vehicles fly there and hold.", auto_close_seconds=AIM_S, color=BRAND

@@ -16,12 +16,10 @@ from gcs.view.labels import Lens
 from gcs.view.overlay import Overlay, Tag
 from gcs.view.sightings import Sightings
 from gcs.view.theme import Theme
-from gcs.view.vehicle_scene import MANY, Pick, VehicleScene
+from gcs.view.vehicle_scene import Pick, VehicleScene
 
 Array = npt.NDArray[np.float64]
 
-SLOWER = 2
-"""Tags of a large fleet are drawn at every second update, and at every move of the camera."""
 MOST_FRAMES_S = 0.04
 """While a camera moves, its overlay follows at this interval."""
 
@@ -39,9 +37,10 @@ class Browser:
     def __init__(self, client: viser.ClientHandle, on_pick: Pick, theme: Theme, legend: str) -> None:
         self._client, self._loop = client, asyncio.get_running_loop()
         self._vehicles = VehicleScene(client.scene, on_pick, theme)
-        self._overlay, self._tags, self._places_m = Overlay(), [], np.zeros((0, 3))
+        self._overlay, self._places_m = Overlay(), np.zeros((0, 3))
+        self._tags: Sequence[Tag] = ()
         self._lens, self._drawn = self._look(), False
-        self._waiting, self._updates = False, 0
+        self._waiting = False
         panel = client.gui.add_panel()
         with panel.add_tab(" "):
             client.gui.add_html(f"<style>{files('gcs.view').joinpath('overlay.css').read_text()}</style>")
@@ -50,14 +49,13 @@ class Browser:
         panel.float(x=0, y=0, width=100)
         client.camera.on_update(self._camera_moved)
 
-    def update(self, seen: Sightings, tags: Sequence[Tag], places_m: Array) -> None:
-        """Bring it up to date: vehicles, and the (n, 3) places of what has a tag."""
+    def update(self, seen: Sightings, tags: Sequence[Tag], places_m: Array, *, overlay: bool) -> None:
+        """Bring it up to date: vehicles, and if it is its turn the overlay, with (n, 3) places of what has a tag."""
         self._follow()
         self._tags, self._places_m = tags, places_m
-        self._updates += 1
         with self._client.atomic():
-            self._vehicles.move(seen, self._lens)
-            if len(seen) <= MANY or self._updates % SLOWER:
+            self._vehicles.move(seen, self._lens, resize=overlay)
+            if overlay:
                 self._draw()
 
     def explain(self, legend: str) -> None:

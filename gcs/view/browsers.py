@@ -2,7 +2,7 @@
 
 import contextlib
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -28,15 +28,15 @@ class Browsers:
         self._server, self._make = server, make
         self._browsers: dict[int, Browser] = {}
 
-    def update(self, seen: Sightings, tags: Sequence[Tag], places_m: Array) -> None:
-        """Bring every browser up to date; (n, 3) places of what has a tag."""
+    def update(self, seen: Sightings, tags: Sequence[Tag], places_m: Array, *, overlay: bool) -> None:
+        """Bring every browser up to date: vehicles, and if it is its turn the overlay; (n, 3) places of the tags."""
         clients = self._server.get_clients()
         self._browsers = {key: browser for key, browser in self._browsers.items() if key in clients}
         with _writes_to_whoever_leaves():
             for key, client in clients.items():
                 if key not in self._browsers:
                     self._browsers[key] = self._make(client)
-                self._browsers[key].update(seen, tags, places_m)
+                self._browsers[key].update(seen, tags, places_m, overlay=overlay)
 
     def explain(self, legend: str) -> None:
         """Show this legend in all of them."""
@@ -50,7 +50,7 @@ class Browsers:
 
 
 @contextlib.contextmanager
-def _writes_to_whoever_leaves() -> Iterator[None]:
+def _writes_to_whoever_leaves() -> Generator[None]:
     """A browser may go at any moment: viser then warns of what is still written to it, which is nothing to tell."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Queued a", category=UserWarning)

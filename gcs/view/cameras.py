@@ -38,7 +38,7 @@ class Cameras:
         self.frame(low_m, high_m)
 
     def frame(self, low_m: Array, high_m: Array) -> None:
-        """What `overview` and `from_above` show from now on, and browsers that come, at first."""
+        """What `overview` and `from_above` show from now on, and browsers at first: a box by (3,) ENU corners."""
         self._low_m, self._high_m = low_m, high_m
         first = self._framed(FROM_SOUTH_WEST, FIRST_ASPECT, FIRST_HEIGHT_PX)
         camera = self._server.initial_camera

@@ -70,10 +70,11 @@ class CommandPanel:
 
     def update(self, selected: list[int]) -> list[tuple[str, str]]:
         """Bring buttons up to date; (button, reason) of all that cannot be pressed."""
-        refused = []
+        refused: list[tuple[str, str]] = []
         for intent, button in self._buttons.items():
             why_not = self._desk.why_not(intent, selected)
-            button.disabled = why_not is not None
+            if button.disabled is not (why_not is not None):  # finding that a button stays as it is takes viser longer
+                button.disabled = why_not is not None
             if why_not is not None and intent not in {Intent.WAIT, Intent.CANCEL}:
                 refused.append((intent.value, why_not))
         if self._desk.flight is not None:
@@ -131,24 +132,24 @@ class CommandPanel:
         self._mark("gcs-kill")
         button = self._gui.add_button("Kill: hold 1.5 s", icon=icon, color=colour, disabled=True)
 
-        def held(event: viser.GuiEvent) -> None:
+        def held(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             client = event.client
             self._presses.do(lambda: self._hold_kill(client))
 
-        button.on_hold(held, callback_hz=HOLD_HZ)
+        button.on_hold(held, callback_hz=HOLD_HZ)  # pyright: ignore[reportUnknownMemberType] - viser's coroutines
         self._buttons[Intent.KILL] = button
 
     def _hold_kill(self, client: viser.ClientHandle | None) -> None:
         if self._kill.held(self._desk.station.now_s):
             self._presses.ask(Intent.KILL, client)
 
-    def _add(self, intent: Intent, act: Callable[[viser.GuiEvent], None] | None = None) -> None:
+    def _add(self, intent: Intent, act: Callable[[viser.GuiEvent[viser.GuiButtonHandle]], None] | None = None) -> None:
         icon, colour = LOOKS[intent]
         button = self._gui.add_button(intent.value, icon=icon, color=colour, disabled=True)
         button.on_click(act or (lambda event: self._ask(intent, event, Details())))
         self._buttons[intent] = button
 
-    def _ask(self, intent: Intent, event: viser.GuiEvent, details: Details) -> None:
+    def _ask(self, intent: Intent, event: viser.GuiEvent[viser.GuiButtonHandle], details: Details) -> None:
         self._presses.ask(intent, event.client, details)
 
     def _mark(self, *classes: str) -> None:
@@ -163,7 +164,7 @@ class CommandPanel:
         name = self._missions.value
         self._presses.ask(Intent.LOAD, client, Details(new=NewMission(load_mission(name), name)))
 
-    def _load_file(self, event: viser.GuiEvent) -> None:
+    def _load_file(self, event: viser.GuiEvent[viser.GuiUploadButtonHandle]) -> None:
         uploaded, name = self._file.value, f"{Path(self._file.value.name).stem or 'mission'}.yaml"
         with TemporaryDirectory() as folder:
             path = Path(folder) / name
@@ -176,7 +177,7 @@ class CommandPanel:
                 return
         self._presses.ask(Intent.LOAD, event.client, Details(new=NewMission(mission, name, uploaded.content)))
 
-    async def _choose_mode(self, event: viser.GuiEvent) -> None:
+    async def _choose_mode(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
         """Ask for the mode that was chosen; the page's own updates of the dropdown have no client.
 
         As a coroutine it is called at once. One of viser's other threads may be late: `_correct` would have been there.
@@ -186,7 +187,7 @@ class CommandPanel:
         if event.client is not None and mode is not self._desk.flight.mode:
             self._presses.ask(Intent.MODE, event.client, Details(mode=mode))
 
-    async def _choose_algorithm(self, event: viser.GuiEvent) -> None:
+    async def _choose_algorithm(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
         """See `_choose_mode`."""
         assert self._desk.planner is not None
         algorithm = self._algorithm.value

@@ -199,7 +199,7 @@ class EditingPanel:
         self._tell("")
         self._redraw(self._picked if self._picked in editing.parts(self.draft) else None)
 
-    def _download(self, event: viser.GuiEvent) -> None:
+    def _download(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
         mission = self.draft
         if event.client is not None:
             event.client.send_file_download(f"{mission.name}.yaml", to_yaml(mission).encode(), save_immediately=True)

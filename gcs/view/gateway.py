@@ -8,7 +8,7 @@ import asyncio
 import contextlib
 import logging
 import secrets
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from importlib.resources import files
 from urllib.parse import urlsplit
 
@@ -115,7 +115,7 @@ class Gateway:
 
 
 @contextlib.asynccontextmanager
-async def open_gateway(host: str, port: int, token: str, upstream_port: int, secret: str) -> AsyncIterator[None]:
+async def open_gateway(host: str, port: int, token: str, upstream_port: int, secret: str) -> AsyncGenerator[None]:
     """A gateway on this address.
 
     Raises:

@@ -27,10 +27,10 @@ AHEAD = 16
 """Points of the line that shows what a companion is about to fly."""
 BATCH, MERGE, MOST_SEGMENTS = 320, 8, 2_560
 """Sealed segments go out in batches; `MERGE` batches become one line, until it has more than `MOST_SEGMENTS`."""
-MOST_OF_ALL = 16_000
+MOST_OF_ALL = 8_000
 """Segments of all lines; the oldest ones are taken away then, so that a browser can come late in any flight.
 
-Each is six triangles: this many are 0.1 million, which a machine without a graphics card draws as well.
+Each is six triangles: this many are 50 000, for which a machine without a graphics card takes some tenths of a second.
 """
 CATCH_UP = 6
 """Of a trail that has grown by no more points than this since the last look, the newest one is enough."""
@@ -116,8 +116,9 @@ def thinned(chunks_m: Array, tolerance_m: float) -> npt.NDArray[np.bool_]:
     """
     needed = np.ones(chunks_m.shape[:2], dtype=bool)
     step = 1
-    while 2 * step < chunks_m.shape[1]:
-        middles = np.arange(step, chunks_m.shape[1] - step, 2 * step)
+    points = int(chunks_m.shape[1])
+    while 2 * step < points:
+        middles = np.arange(step, points - step, 2 * step)
         chords_m = (chunks_m[:, middles - step] + chunks_m[:, middles + step]) / 2
         spare = np.linalg.norm(chunks_m[:, middles] - chords_m, axis=2) < tolerance_m
         for beside in (*range(1 - step, 0), *range(1, step)):
@@ -153,7 +154,7 @@ class SealedLines:
     colours: Colours = field(default_factory=lambda: np.zeros((BATCH, 2, 3), dtype=np.uint8))
     """The batch that is being filled; segments behind the last one have no length."""
     _filled: int = 0
-    _lines: list[SealedLine] = field(default_factory=list)
+    _lines: list[SealedLine] = field(default_factory=list[SealedLine])
     _names: int = 0
 
     def add(self, segments: Array, colours: Colours) -> tuple[list[SealedLine], list[SealedLine]]:

@@ -33,8 +33,6 @@ GroundHeight = Callable[[Array], Array]
 
 TRAIL_PX, AHEAD_PX, STEM_PX = 2.5, 5.0, 1.0
 TRAIL_OF_MANY_PX, AHEAD_OF_MANY_PX = 1.5, 3.0
-SLOWER = 2
-"""In a large fleet, what lies ahead is sent at every second update."""
 
 
 class MotionScene:
@@ -55,7 +53,7 @@ class MotionScene:
         self._trails: Trails | None = None
         self._drawn: list[int] = []
         self._sealed: dict[str, viser.LineSegmentsHandle] = {}
-        self._updates, self._theme = 0, DARK
+        self._theme = DARK
         self._begin(Sightings())
 
     def use(self, theme: Theme) -> None:
@@ -63,21 +61,20 @@ class MotionScene:
         if theme is not self._theme:
             self._theme, self._trails = theme, None
 
-    def update(self, desk: Desk, seen: Sightings, now_s: float) -> None:
-        """Follow the vehicles to where they are now."""
+    def update(self, desk: Desk, seen: Sightings, now_s: float, *, lines: bool = True) -> None:
+        """Follow the vehicles to where they are now: the trails' ends, and if it is their turn all lines."""
         if desk.trails is not self._trails or seen.sysids != self._drawn:
             self._trails = desk.trails
             self._begin(seen)
         if not seen or self._trails is None:
             return
-        self._seal(self._past.take([self._trails.by_sysid.get(sysid) for sysid in seen.sysids]))
-        self._send_batch()
-        self._tails.points = self._past.segments(seen.positions_m)
-        self._stems.points = self._stem_lines(seen.positions_m)
-        self._updates += 1
-        if len(seen) <= MANY or self._updates % SLOWER == 0:
+        if lines:
+            self._seal(self._past.take([self._trails.by_sysid.get(sysid) for sysid in seen.sysids]))
+            self._send_batch()
+            self._stems.points = self._stem_lines(seen.positions_m)
             self._future.take([state.companion for state in seen.states], now_s)
             self._ahead.points = self._future.segments(seen.positions_m)
+        self._tails.points = self._past.segments(seen.positions_m)
 
     def _stem_lines(self, positions_m: Array) -> npt.NDArray[np.float32]:
         stems = np.repeat(positions_m[:, None].astype(np.float32), 2, axis=1)

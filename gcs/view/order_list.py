@@ -26,7 +26,7 @@ class _Line:
     what: str
     state: OrderState
     reason: str
-    who: list[str] = field(default_factory=list)
+    who: list[str] = field(default_factory=list[str])
 
 
 def render(orders: Iterable[Order]) -> str:

@@ -93,7 +93,7 @@ class Overlay:
             self._settle(keys, pixels[shown], sizes, spans, lens, rings=RINGS_OF_MANY if brief else RINGS)
         anchors = pixels[shown]
         stems = _stems([tags[index] for index in shown], anchors, self._offsets, sizes)
-        labels = []
+        labels: list[str] = []
         for index, text, (x, y) in zip(shown, details, (anchors + self._offsets).tolist(), strict=True):
             if x == x:  # not a number: there was no room
                 tag = tags[index]
@@ -125,7 +125,7 @@ def _stems(tags: Sequence[Tag], anchors: Array, offsets: Array, sizes: Array) ->
     """Stems of the tags that stand away from what they name, and rings around what is selected."""
     spans = np.array([tag.span_px for tag in tags])
     far = np.abs(offsets[:, 1]) > (spans + sizes[:, 1]) / 2 + 8.0
-    marks = []
+    marks: list[str] = []
     for index in np.flatnonzero(far | np.array([tag.selected for tag in tags], dtype=bool)).tolist():
         tag, (across, down) = tags[index], anchors[index].tolist()
         if tag.selected:
@@ -155,7 +155,7 @@ def _arrows(tags: Sequence[Tag], places_m: Array, seen: npt.NDArray[np.bool_], l
     across, down = towards_m @ right, -(towards_m @ up)
     half = np.array([lens.width_px, lens.height_px]) / 2 - EDGE_PX
     reach = np.maximum(np.maximum(np.abs(across) / half[0], np.abs(down) / half[1]), 1e-9)
-    marks = []
+    marks: list[str] = []
     for index, x, y, angle in zip(
         hidden, across / reach, down / reach, np.degrees(np.arctan2(down, across)), strict=True
     ):

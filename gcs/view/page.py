@@ -65,7 +65,7 @@ class Page:
 
     def __init__(self, server: viser.ViserServer, desk: Desk) -> None:
         self._server, self._desk, self._loop = server, desk, asyncio.get_running_loop()
-        self._next_tell_s, self._turn = -np.inf, 0
+        self._next_tell_s, self._updates = -np.inf, 0
         self._seen = Sightings()
         self._tags: list[Tag] = []
         self._theme = DARK
@@ -101,20 +101,21 @@ class Page:
         self._seen = sightings(self._desk)
         if len(self._seen) > fleet_before:
             self._frame_fleet()
+        self._updates += 1
+        few, even = len(self._seen) <= MANY, self._updates % 2 == 0
         with self._server.atomic():  # around everything: what it sends is packed by another thread, from its end on
-            self._motion.update(self._desk, self._seen, shown_s)
+            self._motion.update(self._desk, self._seen, shown_s, lines=few or even)
             self._cameras.move(self._seen)
             self._tell(now_s, shown_s)
             places_m = np.concatenate((self._seen.positions_m, self._targets_m))
             tags = self._tags if len(self._tags) == len(places_m) else []
-            self._browsers.update(self._seen, tags, places_m[: len(tags)])
+            self._browsers.update(self._seen, tags, places_m[: len(tags)], overlay=few or not even)
 
     def _tell(self, now_s: float, shown_s: float) -> None:
         """Bring up to date what is read, not watched, if it is time to: of a large fleet a part, so that none waits."""
         parts = (self._look_around, self._tag, *self._panels.parts)
         if len(self._seen) > MANY and self._tags:
-            self._turn = (self._turn + 1) % len(parts)
-            parts[self._turn](self._seen, shown_s)
+            parts[self._updates % len(parts)](self._seen, shown_s)
         elif now_s >= self._next_tell_s:
             self._next_tell_s = now_s + TELL_INTERVAL_S
             for part in parts:
@@ -243,7 +244,7 @@ class Page:
         }
 
     def _view(self, act: Callable[[viser.ClientHandle], None]) -> Press:
-        def press(event: viser.GuiEvent) -> None:
+        def press(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             client = event.client
             if client is not None:
                 self._loop.call_soon_threadsafe(act, client)

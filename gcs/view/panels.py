@@ -24,7 +24,7 @@ SEVERAL = "Several ..."
 LOOKED_UP_INTERVAL_S = 1.0
 """What stands behind other tabs takes a while for a large fleet."""
 
-Press = Callable[[viser.GuiEvent], None]
+Press = Callable[[viser.GuiEvent[viser.GuiButtonHandle]], None]
 
 
 class Panels:
@@ -74,7 +74,7 @@ class Panels:
     def pick(self, sysid: int, joins: bool) -> None:
         """Address orders to a vehicle that was clicked, or to it beside those that were."""
         names = vehicle_names(self._desk)
-        chosen = sorted((self.picked_out if joins else set()) | {sysid})
+        chosen = sorted((self.picked_out if joins else set[int]()) | {sysid})
         if len(chosen) > 1 and SEVERAL in self._choices:
             self._names.value, self._selector.value = ", ".join(names[one] for one in chosen), SEVERAL
         elif len(names) > 1:
@@ -92,7 +92,7 @@ class Panels:
     @property
     def parts(self) -> tuple[Callable[[Sightings, float], None], ...]:
         """What brings each part up to date; viser sends only what has changed."""
-        return (self._show_commands, self._show_table, self._show_log, self._look_up)
+        return (self._show_commands, self._show_log, self._show_table, self._look_up)
 
     def _show_commands(self, _: Sightings, now_s: float) -> None:
         """Head, alerts and buttons."""
@@ -158,7 +158,7 @@ class Panels:
             "Take command", icon=viser.Icon.STEERING_WHEEL, color=CAUTION, visible=False
         )
 
-        def take(event: viser.GuiEvent) -> None:
+        def take(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             client = event.client
             if client is not None:
                 self.presses.do(lambda: self._desk.seat.take(visitor_key(client)))

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 import viser
 
 from gcs.planner.plan import FleetPlan
@@ -10,6 +11,9 @@ from gcs.view import shapes
 from gcs.view.colours import Rgb, vivid
 from gcs.view.theme import DARK, Theme
 from gcs.view.vehicle_scene import MANY
+
+Array = npt.NDArray[np.float64]
+Colours = npt.NDArray[np.uint8]
 
 CURVE_PX, CURVE_OF_MANY_PX = 1.5, 1.0
 MOST_SEGMENTS = 300
@@ -39,7 +43,10 @@ class PlanScene:
         if plan is self._plan or plan is None:
             return False
         self._plan, many = plan, len(plan.vehicles) > MANY
-        curves, tints, points, colours = [], [], [], []
+        curves: list[Array] = []
+        points: list[Array] = []
+        tints: list[Colours] = []
+        colours: list[Colours] = []
         for part in plan.vehicles:
             own = np.array(self._theme.line_planned(vivid(by_sysid[part.sysid]), many=many), np.uint8)
             step = max(1, len(part.curve_m) // MOST_SEGMENTS)

@@ -43,9 +43,9 @@ def contour_interval_m(relief_m: float) -> float:
 
 def tinted(ground: Heights, theme: Theme) -> npt.NDArray[np.uint8]:
     """(m, n, 3) colours of a grid's points, its first row the southernmost."""
-    share = (ground.up_m - ground.up_m.min()) / max(float(np.ptp(ground.up_m)), 1e-9)
+    share: Array = np.sqrt((ground.up_m - ground.up_m.min()) / max(float(np.ptp(ground.up_m)), 1e-9))
     stops = np.array([theme.valley, theme.slope, theme.summit], dtype=float)
-    tint = np.stack([np.interp(np.sqrt(share), [0.0, 0.45, 1.0], stops[:, channel]) for channel in range(3)], axis=-1)
+    tint = np.stack([np.interp(share, [0.0, 0.45, 1.0], stops[:, channel]) for channel in range(3)], axis=-1)
     return (tint * _shade(ground)[..., None]).clip(0, 255).astype(np.uint8)
 
 

@@ -98,11 +98,11 @@ class ReplayPanel:
     def _jump(self, by_s: float) -> None:
         self.want(self._player.position_s + by_s)
 
-    def _moved(self, event: viser.GuiEvent) -> None:
+    def _moved(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
         if event.client is not None:  # not by `update`
             self._on_loop(lambda: self.want(self._line.value))
 
-    def _speed_chosen(self, event: viser.GuiEvent) -> None:
+    def _speed_chosen(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
         chosen = float(str(event.target.value).removesuffix("×"))
         self._on_loop(lambda: self._player.set_speed(chosen))
 

@@ -7,6 +7,7 @@ import viser
 from gcs.desk.seat import CommandSeat
 from gcs.view.gateway import VISITOR_HEADER
 from gcs.view.presses import visitor_key
+from gcs.view.viser_sockets import connections_of, sockets_of
 
 LOCK = (
     "<style>div:has(> div > .gcs-command) button, div:has(> div > .gcs-command) input "
@@ -56,7 +57,7 @@ class Seating:
 
     def _name(self, client_id: int) -> str:
         self._come += 1
-        connection = self._server._websock_server._live_connections.get(client_id)  # pyright: ignore[reportArgumentType]
-        headers = connection.request.headers if connection is not None and connection.request is not None else {}
-        address = headers.get(VISITOR_HEADER)
+        connection = connections_of(sockets_of(self._server)).get(client_id)
+        request = connection.request if connection is not None else None
+        address = request.headers.get(VISITOR_HEADER) if request is not None else None
         return f"browser {self._come}" + (f" ({address})" if address else "")

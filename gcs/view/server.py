@@ -6,20 +6,22 @@ import gc
 import hmac
 import logging
 import socket
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import AsyncExitStack
 from urllib.parse import urlsplit
 
 import rich
 import viser
-from viser.infra import ClientId, WebsockClientConnection, WebsockServer
+from viser.infra import WebsockClientConnection, WebsockServer
 
 from gcs.desk import Desk
 from gcs.errors import UsageError
 from gcs.flight.events import Severity
 from gcs.settings import LOOPBACK
+from gcs.view.client_answers import own_client
 from gcs.view.gateway import SECRET_HEADER, new_secret, open_gateway
 from gcs.view.page import Page
+from gcs.view.viser_sockets import connections_of, on_connection, sockets_of
 from gcs.view.wakening import make_shared
 
 UPDATE_INTERVAL_S = 0.1
@@ -76,17 +78,18 @@ def open_server(host: str, port: int, secret: str | None = None) -> viser.ViserS
     if port:
         _check_free(host, port)
     with _no_announcements():
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-        sockets = server._websock_server
+        with own_client():
+            server = viser.ViserServer(host=host, port=port, verbose=False)
+        sockets = sockets_of(server)
 
-        make_shared(sockets._broadcast_buffer.message_event)
+        make_shared(sockets.get_message_buffer().message_event)
 
         async def examine(client: WebsockClientConnection) -> None:
             make_shared(client.get_message_buffer().message_event)
             await _refuse_strangers(sockets, client.client_id, secret)
 
-        sockets.on_client_connect(examine)
-        for client_id in list(sockets._live_connections):
+        on_connection(sockets, examine)
+        for client_id in list(connections_of(sockets)):
             asyncio.run_coroutine_threadsafe(_refuse_strangers(sockets, client_id, secret), server.get_event_loop())
     if port and server.get_port() != port:  # somebody was faster; viser then takes the next port that is free
         close_server(server)
@@ -136,7 +139,7 @@ def is_own_page(origin: str | None) -> bool:
 
 async def _refuse_strangers(sockets: WebsockServer, client_id: int, secret: str | None) -> None:
     """Close a stranger's connection before anything is sent: browsers let any site connect to loopback."""
-    connection = sockets._live_connections.get(ClientId(client_id))
+    connection = connections_of(sockets).get(client_id)
     if connection is None or connection.request is None:
         return
     headers = connection.request.headers
@@ -161,7 +164,7 @@ def _in_use(host: str, port: int, why: str = "in use") -> UsageError:
 
 
 @contextlib.contextmanager
-def _no_announcements() -> Iterator[None]:
+def _no_announcements() -> Generator[None]:
     """Keep viser from writing to the terminal."""
     console = rich.get_console()
     before, console.quiet = console.quiet, True

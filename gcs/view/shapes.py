@@ -1,5 +1,6 @@
 """Shapes as arrays: meshes of vertices (n, 3) and faces (m, 3), and line segments (n, 2, 3); metres, z up."""
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -77,13 +78,22 @@ def quadrotor() -> Quadrotor:
     return Quadrotor(hull, merged([*arms, *motors, *legs]), merged(rotors))
 
 
+def small_quadrotor() -> Mesh:
+    """A quadrotor of size 1 of a tenth as many triangles, for a picture in which it is a few pixels wide."""
+    outline = np.array([[0.27, 0.0], [-0.17, 0.12], [-0.17, -0.12]])
+    hubs = ARM_LENGTH * np.stack((np.cos(ROTOR_ANGLES), np.sin(ROTOR_ANGLES)), axis=1)
+    arms = [_plate(_bar(hub, 0.05), 0.02) for hub in hubs]
+    rotors = [_plate(circle(ROTOR_RADIUS, 8, hub), 0.07) for hub in hubs]
+    return merged([loft(_raised(outline, -0.04), _raised(outline * 0.6, 0.09)), *arms, *rotors])
+
+
 def hemisphere(radius_m: float, rings: int = 16, segments: int = 48) -> Mesh:
     """The upper half of a sphere around the origin, open below."""
     latitudes = np.linspace(0.0, np.pi / 2, rings + 1)[:-1]
     levels = [_raised(circle(radius_m * np.cos(angle), segments), radius_m * np.sin(angle)) for angle in latitudes]
     vertices = np.concatenate([*levels, [[0.0, 0.0, radius_m]]])
     here, following = np.arange(segments), np.roll(np.arange(segments), -1)
-    bands = []
+    bands: list[npt.NDArray[np.int64]] = []
     for ring in range(rings - 1):
         low, high = ring * segments, (ring + 1) * segments
         bands.append(np.stack((low + here, low + following, high + following), axis=1))
@@ -127,7 +137,7 @@ def ring(points_m: Array) -> Array:
 
 def dashed(segments: Array, dash_m: float) -> Array:
     """(m, 2, 3) dashes about `dash_m` long, as far apart, along (n, 2, 3) segments."""
-    dashes = []
+    dashes: list[Array] = []
     for start, end in segments:
         count = max(1, round(float(np.linalg.norm(end - start)) / (2.0 * dash_m)))
         along = (np.arange(count)[:, None] + np.array([0.25, 0.75])) / count
@@ -169,10 +179,10 @@ def hatching(thing: Box | Cylinder, spacing_m: float) -> Array:
 
 def draped(bounds: Bounds, peaks: Obstacles, spacing_m: float, samples: int) -> Array:
     """(n, 2, 3) a square grid of lines that follow the terrain, a little above it."""
-    lines = []
+    lines: list[Array] = []
     for axis, (low, high), (start, end) in ((0, bounds.east_m, bounds.north_m), (1, bounds.north_m, bounds.east_m)):
         along = np.linspace(start, end, samples + 1)
-        for across in np.arange(np.ceil(low / spacing_m), np.floor(high / spacing_m) + 1) * spacing_m:
+        for across in np.arange(math.ceil(low / spacing_m), math.floor(high / spacing_m) + 1) * spacing_m:
             points = np.empty((samples + 1, 3))
             points[:, axis], points[:, 1 - axis] = across, along
             points[:, 2] = terrain_height(points[:, :2], peaks) + 0.002 * (end - start)
@@ -186,7 +196,7 @@ def _slanted(outline: Array, low_m: float, high_m: float, spacing_m: float) -> A
     lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     ends = np.concatenate(([0.0], np.cumsum(lengths)))
     height = high_m - low_m
-    segments = []
+    segments: list[Array] = []
     for start in np.arange(-height, ends[-1], spacing_m):
         cuts = np.unique(np.clip([start, start + height, *ends], max(start, 0.0), min(start + height, ends[-1])))
         for begin, end in pairwise(cuts):
@@ -194,6 +204,13 @@ def _slanted(outline: Array, low_m: float, high_m: float, spacing_m: float) -> A
             places = np.stack([np.interp(along, ends, corners[:, axis]) for axis in (0, 1)], axis=1)
             segments.append(np.column_stack((places, low_m + along - start)))
     return np.array(segments).reshape(-1, 2, 3)
+
+
+def _plate(outline: Array, up_m: float) -> Mesh:
+    """A convex outline (n, 2) as a face without thickness."""
+    n = len(outline)
+    fan = np.stack((np.zeros(n - 2, dtype=int), np.arange(1, n - 1), np.arange(2, n)), axis=1)
+    return Mesh(_raised(outline, up_m), fan.astype(np.uint32))
 
 
 def _rectangle(low_m: Array, high_m: Array) -> Array:

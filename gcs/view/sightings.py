@@ -1,7 +1,9 @@
 """The fleet as it is drawn: who is where, in the frame of the page; pure."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from types import MappingProxyType
 from typing import NamedTuple, overload
 
 import numpy as np
@@ -44,12 +46,12 @@ class Sightings(Sequence[Sighting]):
         wxyz: (n, 4) rotations of their bodies to ENU.
     """
 
-    states: list[VehicleState] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    colours: list[Rgb] = field(default_factory=list)
+    states: list[VehicleState] = field(default_factory=list[VehicleState])
+    names: list[str] = field(default_factory=list[str])
+    colours: list[Rgb] = field(default_factory=list[Rgb])
     positions_m: Array = field(default_factory=lambda: np.zeros((0, 3)))
     wxyz: Array = field(default_factory=lambda: np.zeros((0, 4)))
-    sysids: list[int] = field(default_factory=list)
+    sysids: list[int] = field(default_factory=list[int])
 
     def __len__(self) -> int:
         return len(self.states)
@@ -78,15 +80,15 @@ def vehicle_order(desk: Desk) -> list[int]:
     return planned + sorted(desk.vehicles.keys() - set(planned))
 
 
-def vehicle_names(desk: Desk) -> dict[int, str]:
+def vehicle_names(desk: Desk) -> Mapping[int, str]:
     """What to call each vehicle, by system id, in the fleet's order."""
-    named = {vehicle.sysid: vehicle.name for vehicle in desk.mission.vehicles} if desk.mission is not None else {}
-    return {sysid: named.get(sysid, f"vehicle {sysid}") for sysid in vehicle_order(desk)}
+    vehicles = desk.mission.vehicles if desk.mission is not None else ()
+    return _names(tuple((vehicle.sysid, vehicle.name) for vehicle in vehicles), tuple(desk.vehicles))
 
 
-def vehicle_colours(sysids: Iterable[int]) -> dict[int, Rgb]:
+def vehicle_colours(sysids: Iterable[int]) -> Mapping[int, Rgb]:
     """One colour per vehicle of an order."""
-    return {sysid: vehicle_colour(index) for index, sysid in enumerate(sysids)}
+    return _colours(tuple(sysids))
 
 
 def sightings(desk: Desk) -> Sightings:
@@ -112,6 +114,18 @@ def sightings(desk: Desk) -> Sightings:
         quaternion_enu_from_flu(np.array([state.attitude_wxyz for state in states])),
         sysids,
     )
+
+
+@lru_cache(maxsize=8)
+def _names(planned: tuple[tuple[int, str], ...], heard: tuple[int, ...]) -> Mapping[int, str]:
+    """The names, which are asked for many times before a vehicle joins."""
+    named = dict(planned)
+    return MappingProxyType(named | {sysid: f"vehicle {sysid}" for sysid in sorted(set(heard) - set(named))})
+
+
+@lru_cache(maxsize=8)
+def _colours(sysids: tuple[int, ...]) -> Mapping[int, Rgb]:
+    return MappingProxyType({sysid: vehicle_colour(index) for index, sysid in enumerate(sysids)})
 
 
 def _ground_offset_m(part: VehicleFlight | None) -> float:

@@ -34,7 +34,8 @@ def spans_m(positions_m: Array, lens: Lens | None) -> Array:
     if lens is None:
         return np.full(len(positions_m), SPAN_M)
     wanted_m = np.maximum(SPAN_M, least_span_px(len(positions_m)) * lens.metres_per_pixel(positions_m))
-    return SPAN_M * GROWTH ** np.round(np.log(wanted_m / SPAN_M) / np.log(GROWTH))
+    steps: Array = np.log(wanted_m / SPAN_M) / np.log(GROWTH)
+    return SPAN_M * GROWTH ** np.round(steps)
 
 
 class VehicleScene:
@@ -56,11 +57,12 @@ class VehicleScene:
         """Draw the vehicles dark or light from now on."""
         self._theme, self._drawn = theme, []
 
-    def move(self, seen: Sightings, lens: Lens | None) -> None:
-        """Bring every vehicle to where it is now."""
+    def move(self, seen: Sightings, lens: Lens | None, *, resize: bool = True) -> None:
+        """Bring every vehicle to where it is now, and if wanted to the size that it needs there."""
         if not seen:
             return
-        sizes_m = spans_m(seen.positions_m, lens)
+        known = self._sizes_m if seen.sysids == self._drawn and not resize else None
+        sizes_m = spans_m(seen.positions_m, lens) if known is None else known
         if seen.sysids != self._drawn:
             self._build(seen, sizes_m)
         places, turns = seen.positions_m.astype(np.float32), seen.wxyz.astype(np.float32)
@@ -76,10 +78,10 @@ class VehicleScene:
             batch.remove()
         self._drawn, self._sizes_m = seen.sysids, sizes_m
         own = np.array([colours.vivid(colour) for colour in seen.colours], dtype=np.uint8)
-        quadrotor = shapes.quadrotor()
         if len(seen) > MANY:
-            self._batches = [self._batch("hull", shapes.merged(quadrotor), own, seen, sizes_m)]
+            self._batches = [self._batch("hull", shapes.small_quadrotor(), own, seen, sizes_m)]
         else:
+            quadrotor = shapes.quadrotor()
             grey = np.tile(np.array(self._theme.airframe, np.uint8), (len(seen), 1))
             self._batches = [
                 self._batch("hull", quadrotor.hull, own, seen, sizes_m),

@@ -34,7 +34,8 @@ FLOOR_OPENING_M = (5.0, 6.0)
 def maze(seed: int, vehicles: int) -> Mission:
     """Walls from floor to ceiling across a room, each with one gap, mostly on the other side than the last one's."""
     rng = np.random.default_rng([seed, vehicles])
-    south, walls = bool(rng.integers(2)), []
+    south = bool(rng.integers(2))
+    walls: list[Box] = []
     for east_m in MAZE_WALLS_EAST_M:
         width_m = rng.uniform(*MAZE_GAP_M)
         inset_m = rng.uniform(0.4, 3.5)
@@ -84,7 +85,8 @@ def forest(seed: int, vehicles: int) -> Mission:
 def floors(seed: int, vehicles: int) -> Mission:
     """Three storeys with one opening in each slab, on opposite sides; from the ground floor to the top one."""
     rng = np.random.default_rng([seed, vehicles])
-    east_first, slabs = bool(rng.integers(2)), []
+    east_first = bool(rng.integers(2))
+    slabs: list[Box] = []
     for level in (1, 2):
         length_m, width_m = rng.uniform(*FLOOR_OPENING_M), rng.uniform(3.0, 4.0)
         at_east = east_first == (level == 1)

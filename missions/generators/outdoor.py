@@ -92,7 +92,8 @@ def canyon(seed: int, vehicles: int) -> Mission:
 
 def _range(rng: np.random.Generator, east_m: float) -> list[Peak]:
     """Peaks from south to north; their feet overlap, so that the saddles lie a little above the plain."""
-    peaks, north_m = [], rng.uniform(0.0, 150.0)
+    peaks: list[Peak] = []
+    north_m = rng.uniform(0.0, 150.0)
     while north_m < 2000.0:
         place = (round(east_m + rng.uniform(-60.0, 60.0), 1), round(north_m, 1))
         height_m, radius_m = round(rng.uniform(450.0, 600.0), 1), round(rng.uniform(130.0, 180.0), 1)
@@ -105,7 +106,8 @@ def _range(rng: np.random.Generator, east_m: float) -> list[Peak]:
 def _obstructed(rng: np.random.Generator, bounds: Bounds, starts_m: Array, targets_m: Array) -> World:
     """Two or three peaks and one or two threats on random straight lines, clear of all starts and targets."""
     n_peaks, n_threats = rng.integers(2, 4), rng.integers(1, 3)
-    peaks, threats = [], []
+    peaks: list[Peak] = []
+    threats: list[Threat] = []
     for index in range(n_peaks):
         radius_m = round(rng.uniform(80.0, 220.0), 1)
         centre_m = _in_the_way(rng, starts_m, targets_m, radius_m)
@@ -124,7 +126,7 @@ def _in_the_way(rng: np.random.Generator, starts_m: Array, targets_m: Array, rad
     """
     while True:
         start_m, target_m = starts_m[rng.integers(len(starts_m))], targets_m[rng.integers(len(targets_m))]
-        on_line_m = start_m + rng.uniform(0.2, 0.85) * (target_m - start_m)
+        on_line_m: Array = start_m + rng.uniform(0.2, 0.85) * (target_m - start_m)
         centre_m = np.round(on_line_m[:2] + rng.uniform(-radius_m, radius_m, 2), 1)
         from_start_m = np.linalg.norm(starts_m[:, :2] - centre_m, axis=1).min()
         from_target_m = np.linalg.norm(targets_m[:, :2] - centre_m, axis=1).min()

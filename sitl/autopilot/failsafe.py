@@ -173,7 +173,8 @@ class Failsafes:
                 return Action.TERMINATE if self._parameters["CBRK_FLIGHTTERM"] == 0 else Action.WARN
             case Cause.GEOFENCE:
                 return _GEOFENCE.get(int(self._parameters["GF_ACTION"]), Action.NONE)
-        return self._battery_action(cause)
+            case Cause.BATTERY_LOW | Cause.BATTERY_CRITICAL | Cause.BATTERY_EMERGENCY:
+                return self._battery_action(cause)
 
     def _battery_action(self, cause: Cause) -> Action:
         """COM_LOW_BAT_ACT: 0 warning, 2 land, 3 return when critical and land when it is an emergency."""

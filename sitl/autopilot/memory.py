@@ -26,7 +26,7 @@ class SigningMemory:
     """32 bytes; None does not sign."""
     timestamp: int = 0
     """The highest one that was sent or accepted."""
-    streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
+    streams: dict[tuple[int, int, int], int] = field(default_factory=dict[tuple[int, int, int], int])
     """(system, component, link id) -> the last timestamp that was accepted."""
 
 
@@ -34,7 +34,7 @@ class SigningMemory:
 class Memory:
     """What PX4 has on its SD card, and the battery; the autopilot reads it at boot and writes it at every change."""
 
-    parameters: dict[str, float | int] = field(default_factory=dict)
+    parameters: dict[str, float | int] = field(default_factory=dict[str, float | int])
     """Those that have been set."""
     mission: Plan = field(default_factory=Plan)
     fence: Plan = field(default_factory=Plan)

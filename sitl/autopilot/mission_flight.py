@@ -168,6 +168,8 @@ class MissionFlight:
             case Cmd.DO_SET_HOME if abs(item.z) <= HIGHEST_M:
                 place = self._place(item, s)
                 craft.set_home(LocalPoint(place.x_m, place.y_m, place.z_m), craft.home_yaw_rad, craft.home_set_s)
+            case _:
+                pass
 
     def _fly(self, item: MissionItem, s: Snapshot, *, keep_height: bool = False) -> None:
         craft = self._craft

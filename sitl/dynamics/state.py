@@ -6,11 +6,12 @@ with its axes swapped; everything else that is a place is in the autopilot's own
 """
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 
-def record(fields: list[tuple]) -> np.dtype:
+def record(fields: list[tuple[str, str] | tuple[str, str, int]]) -> np.dtype[Any]:
     """A record type whose fields are attributes, in compiled code and, with NUMBA_DISABLE_JIT=1, in plain Python."""
     return np.dtype((np.record, np.dtype(fields, align=True)))
 

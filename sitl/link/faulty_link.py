@@ -93,7 +93,8 @@ class FaultyLink:
 
     def arrived(self, way: Direction, now_s: float) -> list[bytes]:
         """The datagrams that have arrived by now, in the order of their arrival."""
-        queue, out = self._flying[way], []
+        queue = self._flying[way]
+        out: list[bytes] = []
         while queue and queue[0][0] <= now_s:
             out.append(heapq.heappop(queue)[2])
         self._n_flying -= len(out)

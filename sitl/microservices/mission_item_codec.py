@@ -27,7 +27,11 @@ LEAST_VERTICES = 3
 _AT_A_PLACE = PLACES | TAKEOFF_AND_LANDING | {Cmd.DO_SET_ROI, Cmd.DO_SET_ROI_LOCATION}
 _PLACED_COMMANDS = {0: _AT_A_PLACE, 1: FENCES | PLACES, 2: frozenset({Cmd.RALLY_POINT})}
 """MAV_MISSION_TYPE -> commands that its plans may hold in a global frame."""
-_OTHER_COMMANDS = {0: (MISSION_COMMANDS - _AT_A_PLACE) | {Cmd.DO_SET_ROI}, 1: frozenset(), 2: frozenset()}
+_OTHER_COMMANDS: dict[int, frozenset[Cmd]] = {
+    0: (MISSION_COMMANDS - _AT_A_PLACE) | {Cmd.DO_SET_ROI},
+    1: frozenset(),
+    2: frozenset(),
+}
 """The same in MAV_FRAME_MISSION."""
 
 

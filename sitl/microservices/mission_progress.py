@@ -4,6 +4,7 @@ from sitl.dialect import mavlink
 from sitl.microservices.outbox import Link, Outbox
 from sitl.microservices.streams import Streams
 from sitl.microservices.telemetry import Moment, mission_current
+from sitl.wire import FieldValues
 
 REPEATS = 10
 REPEAT_S = 1.0
@@ -14,7 +15,7 @@ class MissionProgress:
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
-        self._shown: tuple | None = None
+        self._shown: FieldValues | None = None
         self._reached = 0
         self._repeats_left = 0
         self._repeat_s = 0.0

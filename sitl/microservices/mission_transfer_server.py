@@ -70,7 +70,7 @@ class _Upload:
     count: int
     received_s: float
     asked_s: float = -math.inf
-    items: list[MissionItem] = field(default_factory=list)
+    items: list[MissionItem] = field(default_factory=list[MissionItem])
 
 
 @dataclass
@@ -231,16 +231,17 @@ class MissionTransferServer:
         if download is None or download.sender != sender or download.kind != message.mission_type:
             return
         download.received_s = now_s
+        seq: int = message.seq
         items = self._store.plan(download.kind).items
-        expected = message.seq in (download.next_seq, download.next_seq - 1) and message.seq < download.count
-        if not expected or message.seq >= len(items):
+        expected = seq in (download.next_seq, download.next_seq - 1) and seq < download.count
+        if not expected or seq >= len(items):
             self._download = None
             self._say(Severity.CRITICAL, "WPM: REJ. CMD: Req. WP was unexpected")
             self._acknowledge(sender, mavlink.MAV_MISSION_ERROR, download.kind)
             return
-        download.next_seq = message.seq + 1
+        download.next_seq = seq + 1
         write = int_item if as_int else float_item
-        self._outbox.send(self._link, write(items[message.seq], message.seq, sender, download.kind))
+        self._outbox.send(self._link, write(items[seq], seq, sender, download.kind))
 
     def _sent_all(self, download: _Download) -> bool:
         return download.next_seq >= download.count

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from sitl.dialect import Message
-from sitl.wire import FrameWriter, Layout
+from sitl.wire import FieldValues, FrameWriter, Layout
 
 AUTOPILOT_COMPID = 1
 
@@ -49,16 +49,16 @@ class Outbox:
         for link in Link:
             self.send(link, message)
 
-    def sender_of_values(self, link: Link) -> Callable[[Layout, tuple], None]:
+    def sender_of_values(self, link: Link) -> Callable[[Layout, FieldValues], None]:
         """`send_values` for one link, for who has much to send."""
         writer = self._writers[link]
 
-        def send(layout: Layout, values: tuple) -> None:
+        def send(layout: Layout, values: FieldValues) -> None:
             self._frames.append((link, writer.frame(layout, values)))
 
         return send
 
-    def send_values(self, link: Link, layout: Layout, values: tuple) -> None:
+    def send_values(self, link: Link, layout: Layout, values: FieldValues) -> None:
         """One message as its values in documented order: the quick way, for streams."""
         self._frames.append((link, self._writers[link].frame(layout, values)))
 

@@ -32,9 +32,10 @@ class ParameterServer:
 
     def receive_read(self, message: Message, sender: Sender) -> None:
         """PARAM_REQUEST_READ by index, or by name where the index is -1."""
-        if message.param_index >= 0:
+        index: int = message.param_index
+        if index >= 0:
             names = self._parameters.names
-            name = names[message.param_index] if message.param_index < len(names) else None
+            name = names[index] if index < len(names) else None
         else:
             name = message.param_id
         if name == HASH_CHECK or (name is not None and name in self._parameters):

@@ -19,6 +19,7 @@ from sitl.dialect import mavlink
 from sitl.dynamics.airframe import GRAVITY_M_S2
 from sitl.dynamics.state import Guidance
 from sitl.snapshot import Snapshot
+from sitl.wire import FieldValues
 
 NAN = math.nan
 
@@ -69,11 +70,11 @@ class Moment(NamedTuple):
         return round(self.now_s * 1e6)
 
 
-Build = Callable[[Moment], tuple | None]
+Build = Callable[[Moment], FieldValues | None]
 
 
 # ---------------------------------------------------------------- state
-def heartbeat(m: Moment) -> tuple:
+def heartbeat(m: Moment) -> FieldValues:
     commander = m.autopilot.commander
     mode = commander.mode
     base = mode.value.base_mode
@@ -84,7 +85,7 @@ def heartbeat(m: Moment) -> tuple:
     return mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, base, mode.custom_mode, status, 3
 
 
-def sys_status(m: Moment) -> tuple:
+def sys_status(m: Moment) -> FieldValues:
     battery = m.autopilot.battery
     armable = m.autopilot.commander.armed or m.autopilot.commander.ready
     health = SENSORS_HEALTHY | (PREARM_BIT if armable else 0)
@@ -95,7 +96,7 @@ def sys_status(m: Moment) -> tuple:
     return SENSORS_PRESENT, SENSORS_ENABLED, health, load, voltage_mv, -100, percent, 0, 0, 0, 0, 0, 0, 0, 0, 1
 
 
-def extended_sys_state(m: Moment) -> tuple:
+def extended_sys_state(m: Moment) -> FieldValues:
     return mavlink.MAV_VTOL_STATE_UNDEFINED, landed_state(m)
 
 
@@ -111,26 +112,26 @@ def landed_state(m: Moment) -> int:
     return mavlink.MAV_LANDED_STATE_TAKEOFF if taking_off else mavlink.MAV_LANDED_STATE_IN_AIR
 
 
-def current_mode(m: Moment) -> tuple:
+def current_mode(m: Moment) -> FieldValues:
     commander = m.autopilot.commander
     mode = commander.mode
     return mode.value.standard_mode, mode.custom_mode, commander.intended.custom_mode
 
 
-def battery_status(m: Moment) -> tuple:
+def battery_status(m: Moment) -> FieldValues:
     battery = m.autopilot.battery
     voltages = (round(battery.voltage_v * 1e3),) + (65535,) * 9
     return 0, 1, 1, 32767, voltages, -100, 0, -1, round(battery.remaining * 100.0), 0, 1, (0,) * 4, 0, 0
 
 
-def mission_current(m: Moment) -> tuple:
+def mission_current(m: Moment) -> FieldValues:
     mission = m.autopilot.navigator.mission
     total = len(mission.plan.items) or MISSION_NONE
     ids = (mission.plan.plan_id, m.autopilot.fence.plan.plan_id, m.autopilot.rally.plan_id)
     return mission.current, total, 0, 0, *ids
 
 
-def home_position(m: Moment) -> tuple | None:
+def home_position(m: Moment) -> FieldValues | None:
     autopilot = m.autopilot
     if not autopilot.home_known:
         return None
@@ -142,24 +143,24 @@ def home_position(m: Moment) -> tuple | None:
     return *here, *craft.home, q, 0.0, 0.0, 0.0, round(craft.home_set_s * 1e6)
 
 
-def gps_global_origin(m: Moment) -> tuple:
+def gps_global_origin(m: Moment) -> FieldValues:
     origin = m.autopilot.craft.frame.origin
     return e7(origin.latitude_deg), e7(origin.longitude_deg), round(origin.altitude_m * 1e3), m.time_us
 
 
-def system_time(m: Moment) -> tuple:
+def system_time(m: Moment) -> FieldValues:
     return m.utc_us, m.time_boot_ms
 
 
-def timesync(m: Moment) -> tuple:
+def timesync(m: Moment) -> FieldValues:
     return 0, round(m.now_s * 1e9)
 
 
-def ping(m: Moment) -> tuple:
+def ping(m: Moment) -> FieldValues:
     return m.time_us, round(m.now_s) & 0xFFFFFFFF, 0, 0
 
 
-def autopilot_version(m: Moment) -> tuple:
+def autopilot_version(m: Moment) -> FieldValues:
     c = mavlink
     capabilities = (
         c.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
@@ -180,23 +181,23 @@ def autopilot_version(m: Moment) -> tuple:
 
 
 # --------------------------------------------------------------- motion
-def attitude(m: Moment) -> tuple:
+def attitude(m: Moment) -> FieldValues:
     s = m.s
     return m.time_boot_ms, s.roll_rad, s.pitch_rad, s.yaw_rad, s.p_rad_s, s.q_rad_s, s.r_rad_s
 
 
-def attitude_quaternion(m: Moment) -> tuple:
+def attitude_quaternion(m: Moment) -> FieldValues:
     s = m.s
     return m.time_boot_ms, s.qw, s.qx, s.qy, s.qz, s.p_rad_s, s.q_rad_s, s.r_rad_s, (0.0,) * 4
 
 
-def local_position_ned(m: Moment) -> tuple:
+def local_position_ned(m: Moment) -> FieldValues:
     """Where it believes to be, also when it only reckons: a PX4 goes on to say so."""
     s = m.s
     return m.time_boot_ms, s.x_m, s.y_m, s.z_m, s.vx_m_s, s.vy_m_s, s.vz_m_s
 
 
-def odometry(m: Moment) -> tuple:
+def odometry(m: Moment) -> FieldValues:
     """As PX4's estimator has it: pose and velocity both in the local NED frame."""
     s, ned = m.s, mavlink.MAV_FRAME_LOCAL_NED
     across, up = m.positioning.horizontal_std_m**2, m.positioning.vertical_std_m**2
@@ -209,14 +210,14 @@ def odometry(m: Moment) -> tuple:
     return m.time_us, ned, ned, *pose, *motion, pose_covariance, velocity_covariance, 0, autopilot, 0
 
 
-def global_position_int(m: Moment) -> tuple:
+def global_position_int(m: Moment) -> FieldValues:
     s = m.s
     place = e7(s.latitude_deg), e7(s.longitude_deg), round(s.altitude_m * 1e3), round(s.height_m * 1e3)
     velocity = round(s.vx_m_s * 100.0), round(s.vy_m_s * 100.0), round(s.vz_m_s * 100.0)
     return m.time_boot_ms, *place, *velocity, round(_heading_deg(s.yaw_rad) * 100.0) % 36000
 
 
-def gps_raw_int(m: Moment) -> tuple:
+def gps_raw_int(m: Moment) -> FieldValues:
     s = m.s
     if s.dead_reckoning:
         return m.time_us, 0, 0, 0, 0, 65535, 65535, 65535, 65535, 0, 0, 0, 0, 0, 0, 0
@@ -227,29 +228,29 @@ def gps_raw_int(m: Moment) -> tuple:
     return m.time_us, 3, *place, 70, 110, speed, course, 10, altitude_mm, 900, 1780, 400, 0, 0
 
 
-def vfr_hud(m: Moment) -> tuple:
+def vfr_hud(m: Moment) -> FieldValues:
     s = m.s
     heading = round(_heading_deg(s.yaw_rad)) % 360
     return 0.0, s.ground_speed_m_s, heading, round(s.thrust * 100.0), s.altitude_m, -s.vz_m_s
 
 
-def altitude(m: Moment) -> tuple:
+def altitude(m: Moment) -> FieldValues:
     s = m.s
     return m.time_us, s.altitude_m, s.altitude_m, -s.z_m, s.height_m, 0.0, s.height_m
 
 
-def highres_imu(m: Moment) -> tuple:
+def highres_imu(m: Moment) -> FieldValues:
     s = m.s
     felt = s.force_x_m_s2, s.force_y_m_s2, s.force_z_m_s2, s.p_rad_s, s.q_rad_s, s.r_rad_s
     updated = 0b1_1010_0011_1111  # accelerometer, gyroscope, pressure and its altitude, temperature
     return m.time_us, *felt, 0.0, 0.0, 0.0, _pressure_hpa(s), 0.0, s.altitude_m, _temperature_c(s), updated, 0
 
 
-def scaled_pressure(m: Moment) -> tuple:
+def scaled_pressure(m: Moment) -> FieldValues:
     return m.time_boot_ms, _pressure_hpa(m.s), 0.0, round(_temperature_c(m.s) * 100.0), 0
 
 
-def estimator_status(m: Moment) -> tuple:
+def estimator_status(m: Moment) -> FieldValues:
     flags = 895  # attitude, velocities, positions absolute and predicted, height above ground
     if not m.autopilot.craft.position_valid:
         flags &= ~(2 | 8 | 16 | 256 | 512)  # horizontal velocity and positions
@@ -257,11 +258,11 @@ def estimator_status(m: Moment) -> tuple:
     return m.time_us, flags, 0.1, 0.05, 0.04, 0.08, 0.01, NAN, across, up
 
 
-def vibration(m: Moment) -> tuple:
+def vibration(m: Moment) -> FieldValues:
     return m.time_us, 0.0, 0.0, 0.0, 0, 0, 0
 
 
-def obstacle_distance(m: Moment) -> tuple | None:
+def obstacle_distance(m: Moment) -> FieldValues | None:
     """What the range sensor sees around, in the body's frame."""
     if m.surroundings is None:
         return None
@@ -280,7 +281,7 @@ def _sector_cm(distance_m: float, farthest_cm: int) -> int:
     return farthest_cm + 1 if math.isinf(distance_m) else min(round(distance_m * 100.0), farthest_cm)
 
 
-def utm_global_position(m: Moment) -> tuple:
+def utm_global_position(m: Moment) -> FieldValues:
     """For everybody else in the air; the id is the system's."""
     s = m.s
     across, up = (round(std * 1e3) for std in (m.positioning.horizontal_std_m, m.positioning.vertical_std_m))
@@ -293,13 +294,13 @@ def utm_global_position(m: Moment) -> tuple:
 
 
 # ------------------------------------------------------------- setpoints
-def attitude_target(m: Moment) -> tuple:
+def attitude_target(m: Moment) -> FieldValues:
     s = m.s
     q = s.setpoint_qw, s.setpoint_qx, s.setpoint_qy, s.setpoint_qz
     return m.time_boot_ms, 0, q, s.setpoint_p_rad_s, s.setpoint_q_rad_s, s.setpoint_r_rad_s, s.thrust
 
 
-def position_target_local_ned(m: Moment) -> tuple:
+def position_target_local_ned(m: Moment) -> FieldValues:
     s = m.s
     motion = _setpoint_velocity(s), _setpoint_acceleration(s)
     position = s.setpoint_x_m, s.setpoint_y_m, s.setpoint_z_m
@@ -308,7 +309,7 @@ def position_target_local_ned(m: Moment) -> tuple:
     return m.time_boot_ms, 1, mask, *position, *motion[0], *motion[1], *heading
 
 
-def position_target_global_int(m: Moment) -> tuple | None:
+def position_target_global_int(m: Moment) -> FieldValues | None:
     """The target of an auto mode; only in the air."""
     autopilot, s = m.autopilot, m.s
     if s.landed or autopilot.craft.control.guidance not in (Guidance.WAYPOINT, Guidance.LAND):
@@ -319,7 +320,7 @@ def position_target_global_int(m: Moment) -> tuple | None:
     return m.time_boot_ms, 5, 0, *target, *_setpoint_velocity(s), *_setpoint_acceleration(s), *heading
 
 
-def servo_output_raw(m: Moment) -> tuple:
+def servo_output_raw(m: Moment) -> FieldValues:
     return m.time_us & 0xFFFFFFFF, 0, *motor_pwm(m), *(PWM_OFF,) * 12
 
 

@@ -10,7 +10,7 @@ from sitl.autopilot.places import LocalPoint
 from sitl.dialect import mavlink
 from sitl.dynamics.airframe import GRAVITY_M_S2
 from sitl.microservices.telemetry import PWM_OFF, Moment, e7, motor_pwm
-from sitl.wire import Layout
+from sitl.wire import FieldValues, Layout
 
 RANGE_CM = 10_000
 """How far the range finder looks that points down."""
@@ -27,7 +27,7 @@ def int16(value: float) -> int:
     return min(max(round(value), -(2**15)), 2**15 - 1)
 
 
-def distance_sensor(m: Moment) -> tuple:
+def distance_sensor(m: Moment) -> FieldValues:
     """As PX4's simulation in hardware has it: looking down, on ground that is as high as home."""
     height_cm = min(max(round(m.s.height_m * 100.0), 0), RANGE_CM)
     down = mavlink.MAV_SENSOR_ROTATION_PITCH_270
@@ -47,7 +47,7 @@ def distance_sensor(m: Moment) -> tuple:
     )
 
 
-def scaled_imu(m: Moment) -> tuple:
+def scaled_imu(m: Moment) -> FieldValues:
     """The accelerometer and gyroscope in thousandths; there is no magnetometer."""
     s = m.s
     felt = (int16(force * MILLI_G) for force in (s.force_x_m_s2, s.force_y_m_s2, s.force_z_m_s2))
@@ -55,12 +55,12 @@ def scaled_imu(m: Moment) -> tuple:
     return m.time_boot_ms, *felt, *rates, 0, 0, 0, 0
 
 
-def actuator_output_status(m: Moment) -> tuple:
+def actuator_output_status(m: Moment) -> FieldValues:
     outputs = (*(float(pwm) for pwm in motor_pwm(m)), *(float(PWM_OFF),) * (OUTPUTS - 4))
     return m.time_us, OUTPUTS, outputs + (0.0,) * (OUTPUT_FIELDS - OUTPUTS)
 
 
-def flight_information(m: Moment) -> tuple:
+def flight_information(m: Moment) -> FieldValues:
     """When this or the last flight began; 0 before the first."""
     commander = m.autopilot.commander
     boot_us = m.utc_us - m.time_us
@@ -71,7 +71,7 @@ def flight_information(m: Moment) -> tuple:
     return m.time_boot_ms, armed, airborne, commander.n_armed, 0
 
 
-def hil_state_quaternion(m: Moment) -> tuple:
+def hil_state_quaternion(m: Moment) -> FieldValues:
     """The ground truth, as PX4's simulators give it away."""
     body, s = m.body, m.s
     x, y, z = (float(here - error) for here, error in zip((s.x_m, s.y_m, s.z_m), body["position_error_m"], strict=True))
@@ -83,7 +83,7 @@ def hil_state_quaternion(m: Moment) -> tuple:
     return m.time_us, attitude, *rates, *here, *velocity, 0, 0, *felt
 
 
-def orbit_execution_status(m: Moment) -> tuple | None:
+def orbit_execution_status(m: Moment) -> FieldValues | None:
     """Around what Orbit circles, while it does."""
     autopilot = m.autopilot
     if autopilot.mode is not Mode.ORBIT or not autopilot.armed:
@@ -94,15 +94,15 @@ def orbit_execution_status(m: Moment) -> tuple | None:
     return m.time_us, radius_m, mavlink.MAV_FRAME_GLOBAL, *where
 
 
-def protocol_version(m: Moment) -> tuple:
+def protocol_version(m: Moment) -> FieldValues:
     """MAVLink 2, and 1 is understood."""
     return 200, 100, 200, *(0,) * 16
 
 
-def component_metadata(m: Moment) -> tuple:
+def component_metadata(m: Moment) -> FieldValues:
     """There are no files to be fetched, so their addresses are empty."""
     return m.time_boot_ms, 0, b""
 
 
-def component_information(m: Moment) -> tuple:
+def component_information(m: Moment) -> FieldValues:
     return m.time_boot_ms, 0, 0, b"", b""

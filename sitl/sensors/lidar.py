@@ -71,7 +71,7 @@ class RangeSensors:
         self._latest = math.floor(time_s * self._sensor.rate_hz + 1e-6)
         movers = [(*mover.position(time_s), mover.radius_m) for mover in self._movers]
         vehicles = [(*position, self._body_radius_m) for position in positions_enu_m]
-        scans = []
+        scans: list[Scan] = []
         for index, (position, attitude) in enumerate(zip(positions_enu_m, attitudes_ned_frd, strict=True)):
             balls = movers + vehicles[:index] + vehicles[index + 1 :]
             scans.append(self._scan_one(position, attitude, np.array(balls).reshape(-1, 4), float(clocks_s[index])))
@@ -137,7 +137,8 @@ class PacketStream:
 
     def datagrams(self, scan: Scan) -> list[bytes]:
         """The datagrams of a scan; one without points if nothing was hit, so that silence means a dead sensor."""
-        points, out = scan.points_flu_m, []
+        points = scan.points_flu_m
+        out: list[bytes] = []
         for begin in range(0, max(len(points), 1), POINTS_PER_PACKET):
             part = points[begin : begin + POINTS_PER_PACKET]
             out.append(lidar_packets.pack(LidarPacket(scan.time_s, self._frame, self._number, part)))

@@ -42,7 +42,7 @@ HAPPENINGS = st.one_of(
 )
 STARTS = st.one_of(HAPPENINGS, st.just(events.StartCommanded(GCS)))
 STOPS = st.one_of(STARTS, st.just(events.StopRequested()))
-QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+QUICK = settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 
 
 class Story:

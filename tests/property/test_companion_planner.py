@@ -15,7 +15,7 @@ from missions.world import Box, Cylinder
 
 INDOOR = load_mission("indoor")
 LIMITS = INDOOR.limits
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 EAST, NORTH, UP = st.floats(1.5, 18.5), st.floats(1.5, 13.5), st.floats(0.8, 3.2)
 PLACES = st.tuples(EAST, NORTH, UP)

@@ -88,7 +88,7 @@ class Wanderers:
         return float(apart_m[~np.eye(len(places_m), dtype=bool)].min())
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     n=st.integers(2, 5),
     delay_s=st.floats(0.0, 0.4),

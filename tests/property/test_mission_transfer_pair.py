@@ -64,7 +64,7 @@ def test_on_a_good_link_missions_and_fences_are_stored_as_sent(kind: int, items:
     delay_s=st.sampled_from([0.0, 0.05, 0.25]),
     seed=st.integers(0, 10**6),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_what_the_client_calls_stored_is_stored_whatever_is_lost(n: int, loss: float, delay_s: float, seed: int):
     system = system_with(LinkSettings(loss=loss, delay_s=delay_s, jitter_s=delay_s / 2), seed)
     items = waypoints(n, seed % 100)

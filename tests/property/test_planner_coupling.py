@@ -33,7 +33,7 @@ def limits(separation_m: float, zone_m: float, window: int) -> Coupling:
     )
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 10_000),
     separation_m=st.floats(0.5, 8.0),

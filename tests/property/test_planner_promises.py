@@ -57,7 +57,7 @@ def places(plan: FleetPlan, index: int, times_s: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(times_s, vehicle.times_s, vehicle.curve_m[:, axis]) for axis in range(3)], axis=-1)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
 @given(mission=missions(), seed=st.integers(0, 1000))
 def test_a_feasible_plan_keeps_its_limits(mission: Mission, seed: int):
     plan = plan_mission(mission, seed=seed, evaluations=220)
@@ -79,7 +79,7 @@ def test_a_feasible_plan_keeps_its_limits(mission: Mission, seed: int):
             assert apart_m.min() > limits.separation_m - 5e-3
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
 @given(mission=missions())
 def test_tracks_follow_their_curves(mission: Mission):
     plan = plan_mission(mission, evaluations=60)

@@ -79,7 +79,7 @@ def go_on(flown: Simulator, ticks: int = 3) -> None:
 
 
 @given(datagram=st.binary(max_size=300), link=st.sampled_from(Link))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_bytes_of_any_kind(datagram, link):
     flown = VICTIM.flying
     flown.receive(1, link, datagram)
@@ -113,7 +113,7 @@ def framed(kind, payload: bytes) -> bytes:
 
 
 @given(sent=st.lists(st.tuples(messages(), st.sampled_from(Link)), min_size=1, max_size=12))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_well_formed_messages_with_any_content(sent):
     flown = VICTIM.flying
     dropped = flown.vehicles[1].dropped
@@ -125,7 +125,7 @@ def test_well_formed_messages_with_any_content(sent):
 
 
 @given(data=st.data())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_any_parameters(data):
     flown = VICTIM.flying
     parameters = flown.vehicles[1].autopilot.parameters
@@ -142,7 +142,7 @@ def test_any_parameters(data):
     mask=st.integers(0, 0xFFFF),
     frame=st.sampled_from([1, 8, 0, 7]),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_any_setpoint(numbers, mask, frame):
     values = (0, *numbers[:9], *numbers[9:], mask, 1, 1, frame)
     kind = KINDS["SET_POSITION_TARGET_LOCAL_NED"]

@@ -21,6 +21,7 @@ from gcs.station import Station
 from missions.mission_items import MissionItem
 from missions.tunnel import PayloadType, Reason
 from sitl.microservices.outbox import Link
+from sitl.microservices.streams import BY_ID as STREAMED_BY_ID
 from sitl.simulator import Simulator
 
 RATES_HZ = {331: 30.0, 436: 10.0, 245: 5.0, 242: 1.0}
@@ -41,6 +42,18 @@ MODES = {
     FlightMode.LAND: Mode.LAND,
     FlightMode.RTL: Mode.RTL,
 }
+
+
+def quieten(simulator: Simulator, sysid: int) -> None:
+    """Switch off what a vehicle streams on its onboard link and nobody here reads: most of all messages.
+
+    Distances around are streamed again when a companion asks for them.
+    """
+    codec = Codec(sysid, COMPANION)
+    for message_id in STREAMED_BY_ID.keys() - (EVENTS - {OBSTACLE_DISTANCE}) - ANSWERS:
+        off = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, float(message_id), -1.0
+        command = mavlink.MAVLink_command_long_message(sysid, AUTOPILOT, *off, 0.0, 0.0, 0.0, 0.0, 0.0)
+        simulator.receive(sysid, Link.ONBOARD, codec.pack(command))
 
 
 class OnboardWire:

@@ -37,7 +37,7 @@ from sitl.fleet import TICK_S
 from sitl.microservices.outbox import Link
 from sitl.simulator import Simulator
 from tests.simulation import virtual_time
-from tests.simulation.simulated_autopilot import SimulatedAutopilot
+from tests.simulation.simulated_autopilot import SimulatedAutopilot, quieten
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")
@@ -138,6 +138,8 @@ class WholeSystem:
     def __post_init__(self) -> None:
         looking = self.mode.needs_companions and self.sensor is not SensorKind.NONE
         self.simulator = Simulator(self.truth_mission or self.mission, seed=self.seed, lidar=looking)
+        for sysid in self.simulator.vehicles:
+            quieten(self.simulator, sysid)
         self.lidars = {vehicle.sysid: LidarWire() for vehicle in self.mission.vehicles}
         self.station = Station(unix_us=lambda: 0)
         self.wire = GroundWire(self.simulator)

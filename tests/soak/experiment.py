@@ -1,5 +1,6 @@
 """The soak as an experiment: a row per seed, a summary of what went wrong and what came of it."""
 
+import gc
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
@@ -12,6 +13,9 @@ from tests.simulation.whole_system import WholeSystem
 from tests.soak.invariants import violations
 from tests.soak.scenario import Scenario, draw
 from tests.soak.troubled_system import TroubledSystem
+
+OBJECTS_BETWEEN_COLLECTIONS = 100_000
+"""A flight makes many objects and few cycles: Python looks for these so often that it takes a twentieth of the time."""
 
 
 def fly(scenario: Scenario, seed: int) -> tuple[TroubledSystem, FlightReport, Row]:
@@ -56,6 +60,7 @@ def runs(seeds: Sequence[int]) -> list[Run]:
 
 def work(run: Run) -> Row:
     """Fly one seed; a defect that raises is a violation, too."""
+    gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
     seed = run.number("seed")
     scenario = draw(seed)
     try:

@@ -33,7 +33,7 @@ T = TypeVar("T")
 Rng = np.random.Generator
 
 LOSSES = (0.0, 0.0, 0.02, 0.1, 0.3, 0.5)
-DELAYS_S = (0.0, 0.0, 0.05, 0.05, 0.3, 0.3, 1.0, 2.0)
+DELAYS_S = (0.0, 0.0, 0.0, 0.05, 0.05, 0.05, 0.3, 0.3, 0.3, 0.3, 1.0, 2.0)
 """Long ones are rare: an upload takes minutes on them, with everybody on the ground."""
 CORRUPTIONS = (0.0, 0.0, 0.01, 0.1)
 FLEETS = (2,) * 12 + (3, 4)

@@ -1,0 +1,1 @@
+"""One module or part each, without processes and without waiting; folders as in the packages."""

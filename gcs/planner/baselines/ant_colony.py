@@ -150,5 +150,5 @@ def choose(nodes: Nodes, before: IntArray, place_m: Array, shortest_m: Array, di
                 directness = (shortest_m[ant] + TINY_M) / (np.sqrt(leg) + nodes.ahead_m[i, j] + TINY_M)
                 total += nodes.trail[i, j] ** TRAIL_WEIGHT * directness**HEURISTIC_WEIGHT
             heaped[k] = total
-        k = np.searchsorted(heaped, dice[ant] * total, "right")
+        k = np.searchsorted(heaped, float(dice[ant]) * total, "right")
         chosen[ant, 0], chosen[ant, 1] = before[ant, 0] + k // width - WINDOW, before[ant, 1] + k % width - WINDOW

@@ -47,8 +47,7 @@ class Gapso(Pso):
             self.velocity[parent] = course * np.linalg.norm(self.velocity[parent], axis=1, keepdims=True)
 
     def _mutate(self) -> None:
-        n, d = self.position.shape
-        chosen = np.flatnonzero(self._rng.random(n) < MUTATION)
-        where = self._rng.integers(0, d, len(chosen))
+        chosen = np.flatnonzero(self._rng.random(len(self.position)) < MUTATION)
+        where = self._rng.integers(0, self.position.shape[1], len(chosen))
         self.position[chosen, where] += self._rng.normal(0.0, MUTATION_SHARE * SEARCH_RANGE, len(chosen))
         np.clip(self.position, -1.0, 1.0, out=self.position)

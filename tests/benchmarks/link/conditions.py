@@ -8,7 +8,7 @@ ONE_WAY_DELAY_S = 0.05
 LOSSES = (0.0, 0.1, 0.3, 0.5)
 """Shares of frames that get lost, the same both ways."""
 ITEMS = (10, 100, 1000)
-FEW_ITEMS, USUAL_ITEMS, MANY_ITEMS = ITEMS
+_, USUAL_ITEMS, MANY_ITEMS = ITEMS
 
 
 def waypoints(n: int, rng: np.random.Generator) -> list[MissionItem]:

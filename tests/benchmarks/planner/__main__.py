@@ -44,13 +44,7 @@ def main() -> int:
         for table, figures in PARTS[name](scope):
             results.add(table, figures)
     results.note(f"load average at the end {os.getloadavg()[0]:.1f}")
-    if given.markdown is not None:
-        given.markdown.write_text(results.markdown())
-    met = len(results.figures) - len(results.missed)
-    results.console.print(f"{met} of {len(results.figures)} required figures met", style="bold", highlight=False)
-    for figure in results.missed:
-        results.console.print(f"MISSED  {figure}", style="bold red", highlight=False)
-    return 1 if results.missed else 0
+    return results.conclude(given.markdown)
 
 
 def _in_one_thread() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -80,6 +81,16 @@ class Results:
     @property
     def missed(self) -> list[Figure]:
         return [figure for figure in self.figures if not figure.met]
+
+    def conclude(self, path: Path | None) -> int:
+        """Write everything to a file, where one is given, and print the verdict; the exit code."""
+        if path is not None:
+            path.write_text(self.markdown())
+        met = len(self.figures) - len(self.missed)
+        self.console.print(f"{met} of {len(self.figures)} required figures met", style="bold", highlight=False)
+        for figure in self.missed:
+            self.console.print(f"MISSED  {figure}", style="bold red", highlight=False)
+        return 1 if self.missed else 0
 
     def markdown(self) -> str:
         """All tables, and the verdict on every figure."""

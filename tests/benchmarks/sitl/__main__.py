@@ -35,11 +35,7 @@ def main() -> int:
     results.add(*_one_vehicle(starts))
     with running_fleet(FLEET) as fleet:
         results.add(*_fleet(fleet, alone))
-    if given.markdown is not None:
-        given.markdown.write_text(results.markdown())
-    met = len(results.figures) - len(results.missed)
-    results.console.print(f"{met} of {len(results.figures)} required figures met", style="bold", highlight=False)
-    return 1 if results.missed else 0
+    return results.conclude(given.markdown)
 
 
 def _starts() -> tuple[list[float], Memory]:

@@ -2,13 +2,14 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 from playwright.async_api import Browser, async_playwright
+from playwright.async_api import Page as Tab
 
 from gcs.view.page import Page
 from gcs.view.server import UPDATE_INTERVAL_S, close_server, open_server, spare_the_collector
@@ -21,6 +22,8 @@ Array = npt.NDArray[np.float64]
 
 WARM_UP_S = 4.0
 SLOW_BYTES_PER_S = 30e3
+LOOKED_AT_S = 3.0
+"""From one reload to the next."""
 
 
 @dataclass
@@ -49,11 +52,11 @@ class Load:
 
 
 @dataclass(frozen=True)
-class Reload:
-    """Until the page is there [s], ours and, just before, one with nothing in it."""
+class Opened:
+    """How long a page takes until it is there [s]: in a browser that has never seen it, and when it is loaded again."""
 
-    ours_s: float
-    bare_s: float
+    first_s: float
+    again_s: list[float]
 
 
 @asynccontextmanager
@@ -94,19 +97,18 @@ async def load(count: int, seconds: float, *, fast: int, slow: int) -> Load:
         )
 
 
-async def reloads(count: int, flown_s: float, times: int) -> list[Reload]:
-    """Open the page so many times in a flight that has lasted `flown_s` already, each time beside a bare one."""
-    fleet, found = CirclingFleet(count), list[Reload]()
+async def reloads(count: int, flown_s: float, times: int) -> tuple[Opened, Opened]:
+    """Open the page in a flight that has lasted `flown_s` already and reload it so many times; then so a bare one."""
+    fleet = CirclingFleet(count)
     fleet.have_flown(flown_s, 0.2)
     async with kept_page(fleet) as kept, bare_page() as bare_port, async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=find_chromium(), args=ARGUMENTS)
         try:
-            for _ in range(times + 1):
-                bare_s = await _opened_s(browser, bare_port, "/box", "button")
-                found.append(Reload(await _opened_s(browser, kept.port, "/fleet/hull", ".gcs-fleet tr"), bare_s))
+            await _opened(browser, bare_port, "/box", "button", 0)  # starts the browser's own processes
+            ours = await _opened(browser, kept.port, "/fleet/hull", ".gcs-fleet tr", times)
+            return ours, await _opened(browser, bare_port, "/box", "button", times)
         finally:
             await browser.close()
-    return found[1:]  # the first one starts the browser's own processes
 
 
 @asynccontextmanager
@@ -122,16 +124,27 @@ async def bare_page() -> AsyncIterator[int]:
         await asyncio.to_thread(close_server, server)
 
 
-async def _opened_s(browser: Browser, port: int, node: str, panel: str) -> float:
-    """From opening a tab to a panel and a node of the scene in it [s]."""
+async def _opened(browser: Browser, port: int, node: str, panel: str, times: int) -> Opened:
+    """Open a page in a profile that has never seen it, and reload it so many times, a while after it was there."""
     tab = await browser.new_page(viewport={"width": 1000, "height": 640})
+    try:
+        first_s = await _until_there_s(tab, tab.goto(f"http://{HOST}:{port}", wait_until="commit"), node, panel)
+        again_s: list[float] = []
+        for _ in range(times):
+            await asyncio.sleep(LOOKED_AT_S)
+            again_s.append(await _until_there_s(tab, tab.reload(wait_until="commit"), node, panel))
+        return Opened(first_s, again_s)
+    finally:
+        await tab.close()
+
+
+async def _until_there_s(tab: Tab, loading: Awaitable[object], node: str, panel: str) -> float:
+    """From loading a page to a panel and a node of the scene in it [s]."""
     begun_s = time.perf_counter()
-    await tab.goto(f"http://{HOST}:{port}")
+    await loading
     await tab.wait_for_selector(panel, state="attached", timeout=60_000)
     await tab.wait_for_function(f"{node!r} in (window.__viserSceneTree?.getState() ?? {{}})", timeout=60_000)
-    lasted_s = time.perf_counter() - begun_s
-    await tab.close()
-    return lasted_s
+    return time.perf_counter() - begun_s
 
 
 def _rate(client: RawClient, before: int, lasted_s: float) -> float:

@@ -1,0 +1,1 @@
+"""The companion's parts, and whole flights of it in process."""

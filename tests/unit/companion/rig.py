@@ -8,6 +8,7 @@ import numpy as np
 
 from companion import events, instructions
 from companion.events import FlightMode
+from companion.instructions import CommandResult
 from companion.pilot import Pilot
 from companion.planner.braking import brake_along
 from companion.planner.guide import Guide, lay_guide
@@ -18,6 +19,7 @@ from missions.frames import AutopilotFrame, GeodeticPoint
 from missions.mission import Mission, load_mission
 from missions.mission_items import MissionItem, Track, encode_track
 from missions.trajectory import Motion, Trajectory
+from missions.tunnel import Reason
 
 INDOOR = load_mission("indoor")
 GCS = events.Sender(255, 190)
@@ -26,6 +28,8 @@ LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 START_M = np.array([1.0, 6.5, 1.5])
 HOME = INDOOR.frame.geodetic(np.array([1.0, 6.5, 0.0]))
 TRACK_M = np.array([[4.0, 5.0, 1.5], [7.0, 4.2, 1.5], [12.0, 5.5, 1.5], [19.0, 8.5, 1.5]])
+
+ACTING = (instructions.SendSetpoint, instructions.CommandMode)
 
 Kind = TypeVar("Kind")
 
@@ -171,6 +175,18 @@ class Rig:
 def of(found: list[Any], kind: type[Kind]) -> list[Kind]:
     """Those of a kind."""
     return [instruction for instruction in found if isinstance(instruction, kind)]
+
+
+def acts(found: list[Any]) -> bool:
+    """Whether any of them moves the vehicle."""
+    return any(isinstance(instruction, ACTING) for instruction in found)
+
+
+def acknowledgement(found: list[Any]) -> tuple[CommandResult, Reason]:
+    """The one answer to a MISSION_START of the ground station."""
+    (ack,) = of(found, instructions.AcknowledgeStart)
+    assert ack.sender == GCS
+    return ack.result, ack.reason
 
 
 def moved(place: GeodeticPoint, north_deg: float) -> GeodeticPoint:

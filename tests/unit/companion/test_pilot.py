@@ -8,24 +8,25 @@ from companion import events, instructions
 from companion.events import FlightMode
 from companion.instructions import CommandResult
 from companion.settings import PilotSettings, PlanningMode
-from companion.states import TRANSITIONS
 from missions.mission import OnArrival
 from missions.mission_items import Command, MissionItem, plan_id
 from missions.tunnel import CompanionState, Reason, TrajectoryKind
-from tests.unit.companion.rig import GCS, HOME, INDOOR, LEVEL, START_M, TRACK_M, Rig, items_of, moved, of, with_home
+from tests.unit.companion.rig import (
+    ACTING,
+    HOME,
+    INDOOR,
+    START_M,
+    TRACK_M,
+    Rig,
+    acknowledgement,
+    acts,
+    items_of,
+    moved,
+    of,
+    with_home,
+)
 
 State = CompanionState
-ACTING = (instructions.SendSetpoint, instructions.CommandMode)
-
-
-def acts(found: list) -> bool:
-    return any(isinstance(instruction, ACTING) for instruction in found)
-
-
-def acknowledgement(found: list) -> tuple[CommandResult, Reason]:
-    (ack,) = of(found, instructions.AcknowledgeStart)
-    assert ack.sender == GCS
-    return ack.result, ack.reason
 
 
 # ------------------------------------------------------------------------- getting ready
@@ -313,96 +314,6 @@ def test_a_vehicle_that_does_not_quite_reach_its_target_has_arrived_after_a_whil
     rig.follows = False
     rig.run(20.0, until=lambda: len(of(rig.sent, instructions.CommandMode)) > 1)
     assert of(rig.sent, instructions.CommandMode)[-1].mode is FlightMode.LAND
-
-
-# -------------------------------------------------------------------------------- stop
-
-
-def test_an_idle_companion_stops_at_once():
-    rig = Rig().airborne()
-    assert not acts(rig.feed(events.StopRequested()))
-    assert rig.pilot.done
-
-
-def test_stopped_in_flight_it_brakes_along_its_trajectory_then_commands_hold():
-    rig = Rig().flying()
-    rig.run(3.0)
-    moving = rig.pilot.handle(events.StopRequested(), rig.now_s)
-    assert of(moving, instructions.SendTrajectory) == []  # nothing is announced before UTC is known
-    assert (rig.pilot.state, rig.pilot.reason) == (State.HOLDING, Reason.STOPPED_BY_OPERATOR)
-    braking = rig.run(4.0, until=lambda: FlightMode.HOLD in [c.mode for c in of(rig.sent, instructions.CommandMode)])
-    assert of(braking, instructions.SendSetpoint)
-    assert np.linalg.norm(rig.velocity_ned_m_s) < 0.05
-    assert not rig.pilot.done
-    rig.feed(events.ModeReported(FlightMode.HOLD))
-    assert rig.pilot.done
-    assert of(rig.sent, instructions.EndSetpoints)
-
-
-def test_a_start_is_denied_while_stopping():
-    rig = Rig().flying()
-    rig.feed(events.StopRequested())
-    assert acknowledgement(rig.start()) == (CommandResult.DENIED, Reason.STOPPED_BY_OPERATOR)
-
-
-def test_stopped_while_engaging_it_leaves_the_vehicle_holding():
-    rig = Rig().airborne()
-    rig.start()
-    rig.run(0.1)
-    rig.feed(events.StopRequested())
-    assert of(rig.sent, instructions.CommandMode)[-1].mode is FlightMode.HOLD
-    rig.feed(events.ModeCommandEnded(FlightMode.HOLD, accepted=True))
-    assert rig.pilot.done
-
-
-def test_stopped_while_landing_it_lets_the_autopilot_land():
-    rig = Rig().at_target()
-    rig.feed(events.ModeReported(FlightMode.LAND))
-    assert not acts(rig.feed(events.StopRequested()))
-    assert rig.pilot.done
-
-
-def test_stopped_while_it_hands_over_for_landing_it_says_that_the_vehicle_lands():
-    rig = Rig().at_target()
-    rig.feed(events.StopRequested(), events.ModeReported(FlightMode.LAND))
-    assert rig.pilot.done
-    assert (rig.pilot.state, rig.pilot.reason) == (State.LANDING, Reason.TARGET_REACHED)
-
-
-def test_control_taken_while_stopping_ends_it_as_well():
-    rig = Rig().flying()
-    rig.run(1.0)
-    rig.feed(events.StopRequested(), events.ModeReported(FlightMode.RTL))
-    assert rig.pilot.done
-
-
-# ----------------------------------------------------------------------- lost and found
-
-
-def test_a_lost_autopilot_ends_the_stream_and_it_does_not_fly_on_by_itself():
-    rig = Rig().flying()
-    rig.run(1.0)
-    assert of(rig.feed(events.AutopilotLost()), instructions.EndSetpoints)
-    assert (rig.pilot.state, rig.pilot.reason) == (State.CONNECTING, Reason.AUTOPILOT_LOST)
-    rig.connect()
-    rig.load(items_of())
-    assert rig.pilot.state is State.READY
-    assert not acts(rig.run(3.0))
-
-
-def test_an_autopilot_whose_time_jumps_back_was_rebooted():
-    rig = Rig().flying()
-    rig.run(1.0)
-    rebooted = events.Odometry(3.0, rig.place_ned_m, np.zeros(3), LEVEL)
-    assert of(rig.feed(rebooted), instructions.EndSetpoints)
-    assert rig.pilot.state is State.WAITING
-
-
-def test_a_transition_that_is_not_in_the_table_is_an_error():
-    pilot = Rig().pilot
-    assert State.FLYING not in TRANSITIONS[pilot.state]
-    with pytest.raises(AssertionError, match="CONNECTING to FLYING"):
-        pilot._enter(State.FLYING, Reason.NONE)
 
 
 # ------------------------------------------------------------------ frames and missions

@@ -46,15 +46,20 @@ def flown() -> FleetFlight:
     return flight
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    folder = tmp_path / "flights" / "2026-01-01T00-00-00-indoor"
+def left_in_flight_below(path: Path) -> Path:
+    """The folder of a flight that was left in the air, among the flights below a path."""
+    folder = path / "flights" / "2026-01-01T00-00-00-indoor"
     folder.mkdir(parents=True)
     keeper = JournalKeeper(folder / JOURNAL_FILE)
     keeper.begin(flown(), 1)
     keeper.look(flown(), 2)
     keeper.close()
     return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return left_in_flight_below(tmp_path)
 
 
 def test_a_flight_is_put_where_it_was_left(folder: Path):

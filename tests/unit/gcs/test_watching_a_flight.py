@@ -14,18 +14,12 @@ from gcs.security.audit import AUDIT_FILE
 from gcs.settings import FlightSettings
 from gcs.watch import watch
 from tests.browser.loopback import free_port
-from tests.unit.gcs.test_journal import flown
+from tests.unit.gcs.test_journal import left_in_flight_below
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    folder = tmp_path / "flights" / "2026-01-01T00-00-00-indoor"
-    folder.mkdir(parents=True)
-    keeper = JournalKeeper(folder / JOURNAL_FILE)
-    keeper.begin(flown(), 1)
-    keeper.look(flown(), 2)
-    keeper.close()
-    return folder
+    return left_in_flight_below(tmp_path)
 
 
 def test_a_flight_that_was_left_in_the_air_is_found_whatever_its_mission(folder: Path):

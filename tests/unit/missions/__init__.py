@@ -1,0 +1,1 @@
+"""Mission files, frames, splines, and the formats that programs share."""

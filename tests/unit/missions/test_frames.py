@@ -1,13 +1,15 @@
 """Frames: the mission's ENU, the earth, and each autopilot's own NED."""
 
 import numpy as np
+import pymap3d
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymap3d.vincenty import vdist
 from scipy.spatial.transform import Rotation
 
 from missions.frames import (
-    PX4_EARTH,
+    PX4_EARTH_RADIUS_M,
     AutopilotFrame,
     GeodeticPoint,
     LocalFrame,
@@ -21,15 +23,11 @@ metres = st.floats(-2500.0, 2500.0)
 points = st.tuples(metres, metres, st.floats(-100.0, 1000.0))
 
 
-def px4_projection(latitude_deg: float, longitude_deg: float, origin: GeodeticPoint) -> tuple[float, float]:
-    """PX4's azimuthal equidistant projection of a sphere, from its formula: (north, east) [m]."""
-    lat, lon = np.radians([latitude_deg, longitude_deg])
-    lat0, lon0 = np.radians([origin.latitude_deg, origin.longitude_deg])
-    c = np.arccos(np.clip(np.sin(lat0) * np.sin(lat) + np.cos(lat0) * np.cos(lat) * np.cos(lon - lon0), -1, 1))
-    k = c / np.sin(c) if c > 0 else 1.0
-    north = k * (np.cos(lat0) * np.sin(lat) - np.sin(lat0) * np.cos(lat) * np.cos(lon - lon0))
-    east = k * np.cos(lat) * np.sin(lon - lon0)
-    return north * PX4_EARTH.semimajor_axis, east * PX4_EARTH.semimajor_axis
+def on_px4s_sphere(latitude_deg: float, longitude_deg: float, origin: GeodeticPoint) -> tuple[float, float]:
+    """(north, east) [m] by distance and bearing on a great circle: PX4's azimuthal equidistant projection."""
+    sphere = pymap3d.Ellipsoid(PX4_EARTH_RADIUS_M, PX4_EARTH_RADIUS_M)
+    away_m, azimuth_deg = vdist(origin.latitude_deg, origin.longitude_deg, latitude_deg, longitude_deg, ell=sphere)
+    return away_m * np.cos(np.radians(azimuth_deg)), away_m * np.sin(np.radians(azimuth_deg))
 
 
 @given(point=points)
@@ -53,7 +51,7 @@ def test_an_autopilots_ned_is_px4s_own_projection():
     vehicle_origin = GeodeticPoint(latitude_deg=47.3978, longitude_deg=8.5456, altitude_amsl_m=490.2)
     place = mission.geodetic(np.array([1500.0, -900.0, 120.0]))
     ned = AutopilotFrame(vehicle_origin, mission).ned(np.array([1500.0, -900.0, 120.0]))
-    expected = px4_projection(place.latitude_deg, place.longitude_deg, vehicle_origin)
+    expected = on_px4s_sphere(place.latitude_deg, place.longitude_deg, vehicle_origin)
     np.testing.assert_allclose(ned[:2], expected, atol=1e-3)
     assert ned[2] == pytest.approx(490.2 - place.altitude_amsl_m, abs=1e-6)
 

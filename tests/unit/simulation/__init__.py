@@ -1,0 +1,1 @@
+"""Of the simulation in one process: its virtual time."""

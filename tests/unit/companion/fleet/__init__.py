@@ -1,0 +1,1 @@
+"""Companions among themselves: announcements, right of way, the roster."""

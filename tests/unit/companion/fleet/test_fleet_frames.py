@@ -5,7 +5,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
@@ -99,7 +99,6 @@ def test_what_is_no_report_is_counted_and_dropped(datagram: bytes, reason: str):
     assert reader.dropped[reason] >= 1
 
 
-@settings(deadline=None)
 @given(datagrams=st.lists(st.binary(max_size=300).map(lambda rest: b"\xfd" + rest), max_size=5))
 def test_after_any_garbage_the_next_frame_is_read(datagrams: list[bytes]):
     reader = frames(9)

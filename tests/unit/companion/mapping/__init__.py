@@ -1,0 +1,1 @@
+"""The local map, its distances, and what moves in it."""

@@ -106,7 +106,7 @@ def test_the_field_holds_exactly_the_distances_to_the_occupied_voxels():
 def test_known_obstacles_the_ground_other_vehicles_and_itself_are_not_mapped():
     map_ = new_map()
     points_m = [[10.0, 5.5, 1.0], [3.0, 3.0, 0.1], EYE_M + [0.1, 0.1, 0.0], [4.0, 4.2, 1.5], [5.0, 12.0, 1.5]]
-    map_.observe(scan(points_m), np.array([[4.0, 4.0, 1.5, 0.2]]))
+    map_.observe(scan(points_m), np.array([[4.0, 4.0, 1.5, 0.25]]))
     assert not np.any(map_._grid.strength > 0)
 
 

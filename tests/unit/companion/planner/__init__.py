@@ -1,0 +1,1 @@
+"""The onboard planner: search, archive, limits, ways around."""

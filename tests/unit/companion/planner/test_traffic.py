@@ -7,10 +7,12 @@ from companion.fleet.neighbour import Neighbour
 from companion.mapping.movers import Mover
 from companion.planner.planner import PlanRequest
 from companion.planner.traffic import PARTING_AFTER_S, PARTING_M_S, body_distance, crowding, mover_clearance, traffic
+from companion.sensing.scan import Scan
+from missions.mission import Mission
 from missions.mission_items import Track
 from missions.trajectory import Motion, Trajectory, at_rest
 from missions.tunnel import TrajectoryKind
-from tests.unit.companion.planner.problems import INDOOR, make_planner
+from tests.unit.companion.planner.problems import INDOOR, TERRAIN, make_planner
 
 LIMITS = INDOOR.limits
 START_M, GOAL_M = np.array([2.0, 3.0, 1.5]), np.array([9.0, 3.0, 1.5])
@@ -85,3 +87,20 @@ def test_a_plan_keeps_its_distance_from_a_neighbour_that_crosses_at_the_same_tim
     times_s = plan.grid(0.02)
     apart_m = np.linalg.norm(plan.sample(times_s).position_m - meets.sample(times_s).position_m, axis=1)
     assert apart_m.min() >= LIMITS.separation_m - 0.02
+
+
+@pytest.mark.parametrize(("mission", "off_m"), [(INDOOR, 0.2), (TERRAIN, 2.0)], ids=["indoor", "outdoor"])
+def test_a_neighbour_seen_beside_where_it_says_it_is_is_not_an_obstacle(mission: Mission, off_m: float):
+    """Both estimates are wrong by what their positioning is worth; what stands farther off is mapped all the same."""
+    planner, eye_m = make_planner(mission), mission.start_m(mission.vehicles[0])
+    up_m = np.array([0.0, 0.0, 10.0 if mission is TERRAIN else 0.0])
+    away_m = 8.0 * mission.onboard.voxel_m
+    said_m = eye_m + up_m + np.array([3.0 * away_m, 0.0, 0.0])
+    other = neighbour(at_rest(said_m, 0.0), mission.limits.body_radius_m)
+    seen_m, standing_m = said_m + np.array([0.0, off_m, 0.0]), said_m + np.array([0.0, off_m + away_m, 0.0])
+    for number in range(4):
+        points_m = np.array([seen_m, standing_m])
+        planner.observe(Scan(0.1 * number, eye_m + up_m, points_m, mission.sensor.range_m), (other,))
+    mapped_m, _, _ = planner.certain()
+    assert len(mapped_m) == 1
+    assert np.linalg.norm(mapped_m[0] - standing_m) < 2.0 * mission.onboard.voxel_m

@@ -1,0 +1,1 @@
+"""The algorithms that the cloud planner is compared with."""

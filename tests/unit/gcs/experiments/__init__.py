@@ -1,0 +1,1 @@
+"""The paper's experiments: runs, statistics, what is resumed."""

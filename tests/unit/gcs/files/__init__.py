@@ -1,0 +1,1 @@
+"""Plans and areas in the formats of other tools."""

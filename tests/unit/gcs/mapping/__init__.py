@@ -1,0 +1,1 @@
+"""The observed map of the whole fleet."""

@@ -1,0 +1,1 @@
+"""The cloud planner: costs, gradients, feasibility, allocation."""

@@ -1,0 +1,1 @@
+"""When the cloud plans anew, and what of it is flown."""

@@ -1,0 +1,1 @@
+"""Signing, keys, the audit log, and attacks on them."""

@@ -132,7 +132,7 @@ def seal(sealed: SealedLines, count: int) -> dict[str, SealedLine]:
 
 
 def test_a_long_flight_is_few_lines_and_none_of_it_is_lost():
-    sealed, chunks = SealedLines(), 40 * BATCH // 10
+    sealed, chunks = SealedLines(), 24 * BATCH // 10
     standing = seal(sealed, chunks)
     assert len(standing) < 2 * MERGE
     everything = np.concatenate([*(line.segments for line in standing.values()), sealed.batch])

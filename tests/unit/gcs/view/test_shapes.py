@@ -42,6 +42,13 @@ def test_a_target_marker_is_a_closed_body_of_its_size():
     assert np.ptp(mesh.vertices[:, 2]) == pytest.approx(0.4)
 
 
+def test_a_small_quadrotor_looks_alike_in_a_tenth_of_the_triangles():
+    small, large = shapes.small_quadrotor(), shapes.merged(shapes.quadrotor())
+    assert len(small.faces) < len(large.faces) / 10
+    np.testing.assert_allclose(np.ptp(small.vertices[:, :2], axis=0), np.ptp(large.vertices[:, :2], axis=0), rtol=0.03)
+    assert small.vertices[:, 0].max() == pytest.approx(large.vertices[:, 0].max(), rel=0.03)
+
+
 def test_a_quadrotor_measures_one_from_rotor_tip_to_rotor_tip_and_points_forward():
     quadrotor = shapes.quadrotor()
     tips = np.linalg.norm(quadrotor.rotors.vertices[:, :2], axis=1)

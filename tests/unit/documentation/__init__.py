@@ -1,0 +1,1 @@
+"""The documentation: what it names exists, what it shows works."""
