@@ -13,6 +13,8 @@ HOLD_ON_OFFBOARD_LOSS = 5
 """COM_OBL_RC_ACT: PX4's default, 0, sinks and lands where no sticks are."""
 
 OFFBOARD_LOSS_TIMEOUT_S = 1.0
+FASTEST_M_S = 20.0
+"""PX4 knows no MPC_XY_VEL_MAX above it."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ def requirements(mission: Mission, speed: float) -> tuple[Requirement, ...]:
         Requirement("COM_OF_LOSS_T", timeout_s, "notice soon that setpoints stop", less_is_fine=True),
         Requirement("NAV_DLL_ACT", 0, "fly on without a link to the ground"),
         Requirement("GF_MAX_VER_DIST", fence_height_m(mission), "the fence's height"),
+        Requirement("MPC_XY_VEL_MAX", min(mission.limits.cruise_speed_m_s, FASTEST_M_S), "never faster than the mission"),
     )
 
 

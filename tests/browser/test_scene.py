@@ -13,7 +13,7 @@ from tests.browser.conftest import OpenPage, serving, tab
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
 from tests.browser.toy_player import ToyPlayer
-from tests.browser.watching import OUT, button, camera_position_m, pixel_of, shows, until
+from tests.browser.watching import OUT, button, camera_position_m, middle_of_tag, pixel_of, shows, until
 
 pytestmark = pytest.mark.browser
 
@@ -31,10 +31,7 @@ async def test_two_browsers_have_a_camera_each_and_share_everything_else(browser
             for node in ("/fleet/hull", "/fleet/tails", "/world/fence"):
                 await shows(page, node)
         for vehicle, name in zip(scripted.vehicles, ("alpha", "bravo"), strict=True):
-            box = await one.locator(".gcs-overlay .tag", has_text=name).bounding_box()
-            assert box is not None
-            at = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
-            away = at - await pixel_of(one, vehicle.position_m)
+            away = await middle_of_tag(one, name) - await pixel_of(one, vehicle.position_m)
             assert np.all(np.abs(away) < [100.0, 60.0]), "a tag stands by its vehicle, however finely that is drawn"
         before_m = await camera_position_m(other)
         await button(one, "Top").click()

@@ -74,6 +74,21 @@ async def pixel_of(page: Page, place_m: np.ndarray) -> tuple[float, float]:
     return across, down
 
 
+async def middle_of_tag(page: Page, name: str) -> np.ndarray:
+    """Where in the browser's window a name tag stands. Tags are written anew all the time: it is found and read in one go."""
+    found = await page.wait_for_function(
+        """name => {
+            const tags = Array.from(document.querySelectorAll(".gcs-overlay .tag"));
+            const tag = tags.find(tag => tag.querySelector("b").textContent === name);
+            if (!tag) return null;
+            const { left, top, width, height } = tag.getBoundingClientRect();
+            return [left + width / 2, top + height / 2];
+        }""",
+        arg=name,
+    )
+    return np.array(await found.json_value())
+
+
 async def pixels(page: Page) -> bytes:
     """What the browser's canvas shows, RGBA."""
     values = await page.evaluate(

@@ -189,6 +189,13 @@ def test_safety_parameters_hold_on_offboard_loss_and_time_out_in_wall_clock_seco
     assert not needed["COM_OF_LOSS_T"].met_by(5.1)
 
 
+def test_the_autopilot_itself_flies_at_the_missions_speed_and_no_faster():
+    (limit,) = (required for required in requirements(INDOOR, speed=5.0) if required.name == "MPC_XY_VEL_MAX")
+    assert limit.met_by(INDOOR.limits.cruise_speed_m_s)
+    assert not limit.met_by(12.0)
+    assert not limit.met_by(2.0)
+
+
 def flown(offset_m, speed_m_s: float = 1.0, begins_s: float = 0.0) -> Flown:
     times_s = np.arange(begins_s, 10.0, 0.1)
     along = np.stack((times_s * speed_m_s, np.zeros_like(times_s), np.ones_like(times_s)), axis=-1)

@@ -301,3 +301,26 @@ def test_the_sih_airframe_flies_as_well():
     flown = hovering(airframe=SIH)
     flown.stream(position=(5.0, 0.0, -3.0)).run(8.0)
     assert flown.position[1] == pytest.approx(5.0, abs=0.3)
+
+
+def fastest_after_a_pause(pause_s: float, limit_m_s: float) -> float:
+    """The highest speed from then on when the setpoints of a flight at 2.79 m/s pause and go on where they would be by then."""
+    acceleration_m_s2, cruise_m_s, paused_at_s = 1.5, 2.79, 4.0
+    ramp_s = cruise_m_s / acceleration_m_s2
+    flown = hovering()
+    flown.set_parameter("MPC_XY_VEL_MAX", limit_m_s)
+    begin_s, north, fastest_m_s = flown.time_s, flown.position[1], 0.0
+    while (t := flown.time_s - begin_s) < 7.0:
+        if not paused_at_s <= t < paused_at_s + pause_s:
+            way_m = acceleration_m_s2 * t**2 / 2 if t < ramp_s else cruise_m_s * (t - ramp_s / 2)
+            forward = (min(acceleration_m_s2 * t, cruise_m_s), 0.0, 0.0)
+            flown.stream((north + way_m, 0.0, -3.0), forward, (acceleration_m_s2 if t < ramp_s else 0.0, 0.0, 0.0))
+        flown.run(0.02)
+        if t >= paused_at_s:
+            fastest_m_s = max(fastest_m_s, float(np.linalg.norm(flown.velocity)))
+    return fastest_m_s
+
+
+def test_setpoints_that_were_late_are_not_caught_up_with_faster_than_the_autopilots_limit():
+    assert fastest_after_a_pause(0.8, limit_m_s=12.0) > 3.1
+    assert fastest_after_a_pause(0.8, limit_m_s=3.0) <= 3.0
