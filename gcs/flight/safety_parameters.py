@@ -1,5 +1,6 @@
 """The autopilot's safety settings that a flight relies on: checked always, set with the mission's consent."""
 
+import math
 from dataclasses import dataclass
 
 from gcs.dialect import AUTOPILOT
@@ -27,18 +28,19 @@ class Requirement:
     less_is_fine: bool = False
 
     def met_by(self, found: Value) -> bool:
-        return found <= self.value + 1e-6 if self.less_is_fine else abs(found - self.value) < 1e-6
+        """The wire carries parameters in single precision."""
+        return (self.less_is_fine and found < self.value) or math.isclose(found, self.value, rel_tol=1e-6)
 
 
 def requirements(mission: Mission, speed: float) -> tuple[Requirement, ...]:
     """What a flight of `mission` needs; with a speed factor the autopilot's loss times are wall-clock times, too."""
-    timeout_s = OFFBOARD_LOSS_TIMEOUT_S * speed
+    timeout_s, fastest_m_s = OFFBOARD_LOSS_TIMEOUT_S * speed, min(mission.limits.cruise_speed_m_s, FASTEST_M_S)
     return (
         Requirement("COM_OBL_RC_ACT", HOLD_ON_OFFBOARD_LOSS, "hold when the companion's setpoints stop"),
         Requirement("COM_OF_LOSS_T", timeout_s, "notice soon that setpoints stop", less_is_fine=True),
         Requirement("NAV_DLL_ACT", 0, "fly on without a link to the ground"),
         Requirement("GF_MAX_VER_DIST", fence_height_m(mission), "the fence's height"),
-        Requirement("MPC_XY_VEL_MAX", min(mission.limits.cruise_speed_m_s, FASTEST_M_S), "never faster than the mission"),
+        Requirement("MPC_XY_VEL_MAX", fastest_m_s, "never faster than the mission"),
     )
 
 

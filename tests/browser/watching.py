@@ -75,7 +75,7 @@ async def pixel_of(page: Page, place_m: np.ndarray) -> tuple[float, float]:
 
 
 async def middle_of_tag(page: Page, name: str) -> np.ndarray:
-    """Where in the browser's window a name tag stands. Tags are written anew all the time: it is found and read in one go."""
+    """Where in the browser's window a name tag stands; tags are written anew all the time, so that is one question."""
     found = await page.wait_for_function(
         """name => {
             const tags = Array.from(document.querySelectorAll(".gcs-overlay .tag"));

@@ -304,7 +304,7 @@ def test_the_sih_airframe_flies_as_well():
 
 
 def fastest_after_a_pause(pause_s: float, limit_m_s: float) -> float:
-    """The highest speed from then on when the setpoints of a flight at 2.79 m/s pause and go on where they would be by then."""
+    """The highest speed when setpoints at 2.79 m/s pause for a while and go on where they would be by then."""
     acceleration_m_s2, cruise_m_s, paused_at_s = 1.5, 2.79, 4.0
     ramp_s = cruise_m_s / acceleration_m_s2
     flown = hovering()
