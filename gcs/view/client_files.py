@@ -26,6 +26,11 @@ UNLIT = (
     "enableDefaultLights:!1,enableDefaultLightsShadows:!1,environmentMap:{type:`EnvironmentMapMessage`,hdri_data:null}"
 )
 """The scene of a client to which no server has said anything."""
+CHECKED, UNCHECKED = b"checkShaderErrors:!0", b"checkShaderErrors:!1"
+"""Reading each shader's log, which has nothing to tell once a viewer is built, waits until it is compiled."""
+RESTYLING = re.compile(rb"[^{}]*:has\(\[[^{}]*\{[^{}]*\}")
+"""Rules for details of widgets that no page of ours has. With one of them a browser works out the styles of everything
+on the page again whenever anything is added to it: see the head of page.css."""
 START = (
     '<link rel="modulepreload" href="/{script}"><link rel="stylesheet" href="/{style}"><script type="module">'
     'globalThis.__viserZstdWasm=await WebAssembly.compileStreaming(fetch("/{decoder}"));await import("/{script}")'
@@ -83,9 +88,10 @@ def taken_apart(page: str) -> dict[str, ClientFile]:
     script = both[style_size:]
     if script.count(LIT.encode()) != 1:
         raise UnknownClientError(f"not one but {script.count(LIT.encode())} places that set the lights")
+    unlit = script.replace(LIT.encode(), UNLIT.encode()).replace(CHECKED, UNCHECKED)
     kept = {
-        "style": _kept("client", "css", "text/css; charset=utf-8", both[:style_size]),
-        "script": _kept("client", "js", "text/javascript; charset=utf-8", script.replace(LIT.encode(), UNLIT.encode())),
+        "style": _kept("client", "css", "text/css; charset=utf-8", RESTYLING.sub(b"", both[:style_size])),
+        "script": _kept("client", "js", "text/javascript; charset=utf-8", unlit),
         "decoder": _kept("decoder", "wasm", "application/wasm", gzip.decompress(_unquoted(decoder[1]))),
     }
     start = START.format(**{part: path for part, (path, _) in kept.items()})

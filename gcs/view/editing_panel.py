@@ -207,7 +207,7 @@ class EditingPanel:
     def _tell(self, problem: str) -> None:
         changed = "changed, not flown by anybody" if self.draft != self._loaded else "as it was loaded"
         refused = f'<p class="bad">{escape(problem)}</p>' if problem else ""
-        self._told.content = f'<div class="gcs-editing">{refused}<p>The mission is {changed}.</p></div>'
+        self._told.content = f'<section class="gcs-editing">{refused}<p>The mission is {changed}.</p></section>'
 
 
 def _words(mission: Mission) -> list[str]:

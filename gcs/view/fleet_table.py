@@ -76,7 +76,9 @@ def render(table: Sequence[Row]) -> str:
     head = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
     body = "".join(_render_row(row) for row in table)
     many = " many" if len(table) > FEW else ""
-    return f'<div class="gcs-fleet{many}"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return (
+        f'<section class="gcs-fleet{many}"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></section>'
+    )
 
 
 def _row(

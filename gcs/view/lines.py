@@ -23,8 +23,8 @@ Colours = npt.NDArray[np.uint8]
 
 CHUNK = 10
 """Points of a trail that stay live; when there are more, they are sealed."""
-AHEAD = 16
-"""Points of the line that shows what a companion is about to fly."""
+AHEAD, AHEAD_OF_MANY = 16, 8
+"""Points of the line that shows what a companion is about to fly; of a large fleet's, fewer."""
 BATCH, MERGE, MOST_SEGMENTS = 320, 8, 2_560
 """Sealed segments go out in batches; `MERGE` batches become one line, until it has more than `MOST_SEGMENTS`."""
 MOST_OF_ALL = 8_000
@@ -202,10 +202,11 @@ class WaysAhead:
 
     Args:
         count: how many vehicles.
+        steps: points of each line.
     """
 
-    def __init__(self, count: int) -> None:
-        self._points_m = np.zeros((count, AHEAD, 3))
+    def __init__(self, count: int, steps: int = AHEAD) -> None:
+        self._steps, self._points_m = steps, np.zeros((count, steps, 3))
         self._shown = np.zeros(count, dtype=bool)
         self._revisions: list[int | None] = [None] * count
 
@@ -222,14 +223,16 @@ class WaysAhead:
                 new.setdefault(len(control_m), []).append((index, control_m))
         self._shown[:] = shown
         for count, alike in new.items():  # trajectories of as many control points at once
-            self._points_m[[index for index, _ in alike]] = _basis(count) @ np.array([own for _, own in alike])
+            self._points_m[[index for index, _ in alike]] = _basis(count, self._steps) @ np.array(
+                [own for _, own in alike]
+            )
 
     def segments(self, positions_m: Array) -> Segments:
-        """(n * AHEAD, 2, 3) of what lies ahead of the vehicles at (n, 3) positions, from each vehicle onwards."""
+        """(n * steps, 2, 3) of what lies ahead of the vehicles at (n, 3) positions, from each vehicle onwards."""
         points_m = np.where(self._shown[:, None, None], self._points_m, positions_m[:, None])
         away_m = points_m - positions_m[:, None]
         nearest = np.argmin(np.einsum("nak,nak->na", away_m, away_m), axis=1)
-        following = np.minimum(nearest[:, None] + 1 + np.arange(AHEAD), AHEAD - 1)
+        following = np.minimum(nearest[:, None] + 1 + np.arange(self._steps), self._steps - 1)
         return _joined(positions_m[:, None], points_m[np.arange(len(points_m))[:, None], following])
 
 
@@ -243,10 +246,10 @@ def _joined(first_m: Array, then_m: Array) -> Segments:
 
 
 @lru_cache(maxsize=32)
-def _basis(count: int) -> Array:
-    """(AHEAD, count) weights of the control points of a uniform cubic B-spline at equal steps along it."""
-    phase = np.linspace(0.0, count - 3, AHEAD)
+def _basis(count: int, steps: int) -> Array:
+    """(steps, count) weights of the control points of a uniform cubic B-spline at equal steps along it."""
+    phase = np.linspace(0.0, count - 3, steps)
     segment = np.minimum(phase.astype(int), count - 4)
-    weights = np.zeros((AHEAD, count))
-    weights[np.arange(AHEAD)[:, None], segment[:, None] + np.arange(4)] = uniform_rows(phase - segment)[0]
+    weights = np.zeros((steps, count))
+    weights[np.arange(steps)[:, None], segment[:, None] + np.arange(4)] = uniform_rows(phase - segment)[0]
     return weights

@@ -30,7 +30,7 @@ def render(desk: Desk, now_s: float) -> str:
     dropped = desk.station.codec.malformed
     foot = f"<p>{dropped} malformed frames were dropped</p>" if dropped else ""
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-    return f'<div class="gcs-fleet gcs-links">{table}{foot}</div>'
+    return f'<section class="gcs-fleet gcs-links">{table}{foot}</section>'
 
 
 def _cells(desk: Desk, sysid: int, now_s: float) -> tuple[str, ...]:

@@ -49,9 +49,9 @@ def render_head(desk: Desk, now_s: float) -> str:
     mission, (phase, tone) = desk.mission, flight_phase(desk)
     name, about = (mission.name, _about(mission)) if mission is not None else ("No mission", "Whatever is on the links")
     return (
-        f'<div class="gcs-head"><h1>{escape(name)}</h1><p>{escape(about)}</p>'
-        f'<div class="phase {tone.value}"><s></s>{escape(phase)}</div><small>{escape(_manner(desk))}</small>'
-        f"{_countdown(desk, now_s)}</div>"
+        f'<section class="gcs-head"><h1>{escape(name)}</h1><p>{escape(about)}</p>'
+        f'<span class="phase {tone.value}"><s></s>{escape(phase)}</span><small>{escape(_manner(desk))}</small>'
+        f"{_countdown(desk, now_s)}</section>"
     )
 
 
@@ -73,12 +73,12 @@ def render_plan(plan: FleetPlan | None, progress: Sequence[Progress]) -> str:
         best, verdict = last.objective, "feasible" if last.feasible else "not feasible yet"
         tone, effort = Tone.GOOD if last.feasible else Tone.WARN, f"{_thousands(last.evaluations)} evaluations"
     else:
-        return '<div class="gcs-plan empty">No plan yet</div>'
+        return '<section class="gcs-plan empty">No plan yet</section>'
     course = plan.convergence if plan is not None else progress
     return (
-        f'<div class="gcs-plan"><div><b>{best:.1f}</b><small>objective</small>'
-        f'<i class="{tone.value}">{verdict}</i></div>'
-        f"{chart([step.objective for step in course])}<p>{effort}</p></div>"
+        f'<section class="gcs-plan"><span class="figure"><b>{best:.1f}</b><small>objective</small>'
+        f'<i class="{tone.value}">{verdict}</i></span>'
+        f"{chart([step.objective for step in course])}<p>{effort}</p></section>"
     )
 
 
@@ -88,7 +88,7 @@ def render_reasons(refused: Iterable[tuple[str, str]]) -> str:
     for button, reason in refused:
         by_reason.setdefault(reason, []).append(button)
     lines = (f"<p><b>{escape(', '.join(buttons))}</b> {escape(why)}</p>" for why, buttons in by_reason.items())
-    return f'<div class="gcs-reasons">{"".join(lines)}</div>'
+    return f'<section class="gcs-reasons">{"".join(lines)}</section>'
 
 
 def chart(values: Sequence[float]) -> str:

@@ -13,8 +13,10 @@ import viser
 from gcs.desk import Desk
 from gcs.flight.trails import Trails
 from gcs.view.colours import Rgb, vivid
+from gcs.view.line_model import line_model
 from gcs.view.lines import (
     AHEAD,
+    AHEAD_OF_MANY,
     CHUNK,
     FleetTrails,
     SealedLine,
@@ -26,6 +28,7 @@ from gcs.view.lines import (
 from gcs.view.sightings import Sightings
 from gcs.view.theme import DARK, Theme
 from gcs.view.vehicle_scene import MANY
+from gcs.view.viser_internals import send
 
 Array = npt.NDArray[np.float64]
 GroundHeight = Callable[[Array], Array]
@@ -52,7 +55,7 @@ class MotionScene:
         self._spacing_m, self._tolerance_m = spacing_m, tolerance_m
         self._trails: Trails | None = None
         self._drawn: list[int] = []
-        self._sealed: dict[str, viser.LineSegmentsHandle] = {}
+        self._sealed: dict[str, viser.SceneNodeHandle] = {}
         self._theme = DARK
         self._begin(Sightings())
 
@@ -71,10 +74,10 @@ class MotionScene:
         if lines:
             self._seal(self._past.take([self._trails.by_sysid.get(sysid) for sysid in seen.sysids]))
             self._send_batch()
-            self._stems.points = self._stem_lines(seen.positions_m)
+            send(self._stems, points=self._stem_lines(seen.positions_m))
             self._future.take([state.companion for state in seen.states], now_s)
-            self._ahead.points = self._future.segments(seen.positions_m)
-        self._tails.points = self._past.segments(seen.positions_m)
+            send(self._ahead, points=self._future.segments(seen.positions_m))
+        send(self._tails, points=self._past.segments(seen.positions_m))
 
     def _stem_lines(self, positions_m: Array) -> npt.NDArray[np.float32]:
         stems = np.repeat(positions_m[:, None].astype(np.float32), 2, axis=1)
@@ -87,13 +90,14 @@ class MotionScene:
             handle.remove()
         self._sealed, self._lines, self._batch_sent = {}, SealedLines(), True
         self._drawn, self._past = seen.sysids, FleetTrails(len(seen), self._spacing_m)
-        self._future = WaysAhead(len(seen))
         own = [vivid(colour) for colour in seen.colours]
-        many = len(seen) > MANY
+        many = self._many = len(seen) > MANY
+        ahead = AHEAD_OF_MANY if many else AHEAD
+        self._future = WaysAhead(len(seen), ahead)
         self._colours = [self._theme.line_behind(colour, many=many) for colour in own]
         self._trail_px, ahead_px = (TRAIL_OF_MANY_PX, AHEAD_OF_MANY_PX) if many else (TRAIL_PX, AHEAD_PX)
         self._tails = self._live("/fleet/tails", CHUNK, self._colours, self._trail_px)
-        self._ahead = self._live("/fleet/ahead", AHEAD, [self._theme.line_ahead(colour) for colour in own], ahead_px)
+        self._ahead = self._live("/fleet/ahead", ahead, [self._theme.line_ahead(colour) for colour in own], ahead_px)
         self._stems = self._live("/fleet/stems", 1, own, STEM_PX)
         self._batch = self._line("/trails/newest", self._lines.batch, self._lines.colours, visible=False)
 
@@ -119,8 +123,13 @@ class MotionScene:
         self._batch.colors = self._lines.colours
         self._batch.visible = True
 
-    def _draw_sealed(self, line: SealedLine) -> viser.LineSegmentsHandle:
-        return self._line(f"/trails/{line.name}", line.segments, line.colours, visible=True)
+    def _draw_sealed(self, line: SealedLine) -> viser.SceneNodeHandle:
+        """A large fleet's are many: plain lines, which cost a browser least."""
+        name = f"/trails/{line.name}"
+        if self._many:
+            model = line_model(line.segments, line.colours)
+            return self._scene.add_glb(name, model, cast_shadow=False, receive_shadow=False)
+        return self._line(name, line.segments, line.colours, visible=True)
 
     def _line(
         self, name: str, segments: Array, colours: npt.NDArray[np.uint8], *, visible: bool

@@ -74,7 +74,7 @@ class Overlay:
         pixels, seen = lens.project(places_m)
         parts = [self._tags(tags, pixels, seen, lens), _arrows(tags, places_m, seen, lens), _compass(lens), _bar(lens)]
         size = f"--width:{lens.width_px};--height:{lens.height_px}"
-        return f'<div class="gcs-overlay" style="{size}">{"".join(parts)}</div>'
+        return f'<section class="gcs-overlay" style="{size}">{"".join(parts)}</section>'
 
     def _tags(self, tags: Sequence[Tag], pixels: Array, seen: npt.NDArray[np.bool_], lens: Lens) -> str:
         brief = sum(tag.look != TARGET for tag in tags) > FEW
@@ -118,7 +118,7 @@ def _label(name: str, details: str, colour: Rgb, look: str, selected: bool) -> t
     """A tag's HTML before and after the pixel where it stands, which alone changes all the time."""
     told = f"<span>{escape(details)}</span>" if details else ""
     look = f"{look} sel" if selected else look
-    return f'<div class="tag {look}" style="--x:', f';--own:{css(colour)}"><b>{escape(name)}</b>{told}</div>'
+    return f'<p class="tag {look}" style="--x:', f';--own:{css(colour)}"><b>{escape(name)}</b>{told}</p>'
 
 
 def _stems(tags: Sequence[Tag], anchors: Array, offsets: Array, sizes: Array) -> str:
@@ -171,9 +171,9 @@ def _compass(lens: Lens) -> str:
     forward = -back[:2] if abs(back[2]) < 0.99 else up[:2]
     angle = math.degrees(math.atan2(float(right[1]), float(forward[1])))
     return (
-        f'<div class="compass" title="north"><svg viewBox="-20 -20 40 40"><circle r="18"/>'
+        f'<figure class="compass" title="north"><svg viewBox="-20 -20 40 40"><circle r="18"/>'
         f'<g transform="rotate({angle:.0f})"><path d="M0-13 4 0H-4Z"/><path class="south" d="M0 13 4 0H-4Z"/></g>'
-        "</svg></div>"
+        "</svg></figure>"
     )
 
 
@@ -182,7 +182,7 @@ def _bar(lens: Lens) -> str:
     metres = BAR_PX * float(lens.metres_per_pixel(lens.pose.look_at_m[None])[0])
     power = 10.0 ** math.floor(math.log10(metres))
     length_m = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= metres)
-    return f'<div class="scale" style="--long:{BAR_PX * length_m / metres:.0f}">{length_words(length_m)}</div>'
+    return f'<p class="scale" style="--long:{BAR_PX * length_m / metres:.0f}">{length_words(length_m)}</p>'
 
 
 def length_words(length_m: float) -> str:

@@ -152,6 +152,7 @@ class Panels:
             self._selector.value = next(iter(choices))
 
     def _add_head(self) -> None:
+        self._gui.add_html('<span class="gcs-top"></span>')
         self._head = self._gui.add_html("")
         self._alerts = self._gui.add_html("")
         self._take_command = self._gui.add_button(

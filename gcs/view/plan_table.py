@@ -12,13 +12,15 @@ HEADINGS = ("Algorithm", "Objective", "Verdict", "Evaluations", "Time", "Course"
 def render(candidates: Mapping[str, FleetPlan], flown: FleetPlan | None) -> str:
     """One row per algorithm, the best feasible plan first; the one that is flown is marked."""
     if not candidates:
-        return (
-            '<div class="gcs-fleet gcs-plans"><p>No plan yet: Plan makes one, Compare one by each algorithm.</p></div>'
-        )
+        return _framed("<p>No plan yet: Plan makes one, Compare one by each algorithm.</p>")
     ranked = sorted(candidates.values(), key=lambda plan: (not plan.feasible, plan.objective))
     head = "".join(f"<th>{heading}</th>" for heading in HEADINGS)
     body = "".join(_row(plan, plan is flown) for plan in ranked)
-    return f'<div class="gcs-fleet gcs-plans"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return _framed(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+
+
+def _framed(contents: str) -> str:
+    return f'<section class="gcs-fleet gcs-plans">{contents}</section>'
 
 
 def _row(plan: FleetPlan, flown: bool) -> str:

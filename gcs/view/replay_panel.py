@@ -79,7 +79,7 @@ class ReplayPanel:
         self._play.label = "Pause" if self._player.playing else "Play"
         self._play.icon = viser.Icon.PLAYER_PAUSE if self._player.playing else viser.Icon.PLAYER_PLAY
         place = f"{clock_words(self._player.position_s)} of {clock_words(self._player.duration_s)}"
-        self._told.content = f'<div class="gcs-replay"><b>{place}</b> at {self._player.speed:g}× time</div>'
+        self._told.content = f'<section class="gcs-replay"><b>{place}</b> at {self._player.speed:g}× time</section>'
 
     def _button(self, label: str, icon: viser.IconName, act: Callable[[], None], colour: Rgb) -> viser.GuiButtonHandle:
         button = self._gui.add_button(label, icon=icon, color=colour)

@@ -7,7 +7,7 @@ import viser
 from gcs.desk.seat import CommandSeat
 from gcs.view.gateway import VISITOR_HEADER
 from gcs.view.presses import visitor_key
-from gcs.view.viser_sockets import connections_of, sockets_of
+from gcs.view.viser_internals import connections_of, sockets_of
 
 LOCK = (
     "<style>div:has(> div > .gcs-command) button, div:has(> div > .gcs-command) input "
@@ -44,16 +44,16 @@ class Seating:
 
     def _sign(self, key: str) -> str:
         if len(self._seat.present) < 2:
-            return '<div class="gcs-seat alone"></div>' if self._seat.holder == key else self._look_on()
+            return '<section class="gcs-seat alone"></section>' if self._seat.holder == key else self._look_on()
         if self._seat.holder == key:
             others = len(self._seat.present) - 1
-            return f'<div class="gcs-seat mine">You are in command<small>{others} looking on</small></div>'
+            return f'<section class="gcs-seat mine">You are in command<small>{others} looking on</small></section>'
         return self._look_on()
 
     def _look_on(self) -> str:
         who = self._seat.holder_name
         said = f"{escape(who)} is in command" if who else "Nobody is in command"
-        return f'{LOCK}<div class="gcs-seat">{said}<small>you look on</small></div>'
+        return f'{LOCK}<section class="gcs-seat">{said}<small>you look on</small></section>'
 
     def _name(self, client_id: int) -> str:
         self._come += 1

@@ -21,7 +21,7 @@ from gcs.settings import LOOPBACK
 from gcs.view.client_answers import own_client
 from gcs.view.gateway import SECRET_HEADER, new_secret, open_gateway
 from gcs.view.page import Page
-from gcs.view.viser_sockets import connections_of, on_connection, sockets_of
+from gcs.view.viser_internals import connections_of, on_connection, sockets_of
 from gcs.view.wakening import make_shared
 
 UPDATE_INTERVAL_S = 0.1

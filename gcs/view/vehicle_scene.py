@@ -10,6 +10,7 @@ from gcs.view import colours, shapes
 from gcs.view.labels import Lens
 from gcs.view.sightings import Sightings
 from gcs.view.theme import DARK, Theme
+from gcs.view.viser_internals import send
 
 Array = npt.NDArray[np.float64]
 Pick = Callable[[int, bool], None]
@@ -68,8 +69,7 @@ class VehicleScene:
         places, turns = seen.positions_m.astype(np.float32), seen.wxyz.astype(np.float32)
         resized, self._sizes_m = not np.array_equal(sizes_m, self._sizes_m), sizes_m
         for batch in self._batches:
-            batch.batched_positions = places
-            batch.batched_wxyzs = turns
+            send(batch, batched_positions=places, batched_wxyzs=turns)
             if resized:
                 batch.batched_scales = sizes_m.astype(np.float32)
 

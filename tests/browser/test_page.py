@@ -12,7 +12,7 @@ from gcs.flight.monitor import Phase
 from tests.browser.conftest import FINE, LARGE, OpenPage
 from tests.browser.scripted_desk import ScriptedDesk
 from tests.browser.scripted_plan import scripted_plan
-from tests.browser.watching import OUT, button, camera_position_m, pixels, row, scene, until
+from tests.browser.watching import OUT, button, camera_position_m, pixels, restyled, row, scene, until
 
 pytestmark = pytest.mark.browser
 
@@ -183,3 +183,13 @@ async def test_every_world_is_drawn(open_page: OpenPage, mission: str, vehicles:
     drawn = shown[shown[:, 3] > 0]
     assert len(drawn) > 0.1 * len(shown), "most of the picture is empty"
     assert len(np.unique(drawn // 16, axis=0)) > 60, "the picture has hardly any colours"
+
+
+async def test_what_is_written_anew_ten_times_a_second_leaves_the_styles_of_the_rest_alone(open_page: OpenPage):
+    page = await open_page(await flying("indoor"))
+    await expect(page.locator(".gcs-overlay .tag.vehicle")).to_have_count(2)
+    await page.wait_for_timeout(2000)
+    everything = await page.evaluate("document.querySelectorAll('*').length")
+    counts = await restyled(page, 3.0)
+    assert len(counts) > 5, "tags and table are written anew"
+    assert np.median(counts) < 0.3 * everything, counts

@@ -1,6 +1,7 @@
 """What tests look for on the page, and press."""
 
 import asyncio
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -87,6 +88,17 @@ async def middle_of_tag(page: Page, name: str) -> np.ndarray:
         arg=name,
     )
     return np.array(await found.json_value())
+
+
+async def restyled(page: Page, seconds: float) -> list[int]:
+    """How many elements the browser has worked out the styles of, each time that it has, while so much time passes."""
+    browser = page.context.browser
+    assert browser is not None
+    await browser.start_tracing(page=page, categories=["devtools.timeline"])
+    await page.wait_for_timeout(1e3 * seconds)
+    events = json.loads(await browser.stop_tracing())["traceEvents"]
+    counts = (event["args"].get("elementCount") for event in events if event["name"] == "UpdateLayoutTree")
+    return [count for count in counts if count is not None]
 
 
 async def pixels(page: Page) -> bytes:
