@@ -85,10 +85,13 @@ class Processes:
         # Companions first: they need the autopilots to leave their vehicles in a chosen state.
         for child in reversed(self._children):
             self._signal(child, signal.SIGTERM)
-        await asyncio.shield(asyncio.gather(*(self._ended(child) for child in self._children)))
+        await asyncio.shield(self._all_ended())
         for reader in self._readers:
             reader.cancel()
         await asyncio.gather(*self._readers, return_exceptions=True)
+
+    async def _all_ended(self) -> None:
+        await asyncio.gather(*(self._ended(child) for child in self._children))
 
     async def _ended(self, child: Child) -> None:
         try:

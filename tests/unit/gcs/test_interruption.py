@@ -1,6 +1,7 @@
 """Ctrl-C, at any time, is an exit code and no traceback."""
 
 import asyncio
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -8,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from gcs import cli
+from gcs.processes import Processes
 
 LONG_S = 30.0
 
@@ -42,3 +44,25 @@ def test_ctrl_c_after_a_failure_is_told_from_a_crash(monkeypatch: pytest.MonkeyP
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert ended.value.code == 130
+
+
+async def a_session_whose_program_takes_its_time_to_end() -> None:
+    loop = asyncio.get_running_loop()
+    async with Processes() as processes:
+        deaf = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN)"
+        await processes.start("slow", "timeit", "-n1", "-r1", "-s", deaf, "time.sleep(2.0)")
+        for delay_s in (0.7, 1.0):
+            loop.call_later(delay_s, os.kill, os.getpid(), signal.SIGINT)
+        await asyncio.sleep(LONG_S)
+
+
+def test_who_presses_ctrl_c_again_while_programs_end_sees_no_traceback(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    session = a_session_whose_program_takes_its_time_to_end
+    monkeypatch.setattr(cli, "app", lambda standalone_mode: asyncio.run(session()))
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    gc.collect()
+    assert ended.value.code == 130
+    assert [record.getMessage() for record in caplog.records] == []
