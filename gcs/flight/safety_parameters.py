@@ -14,8 +14,6 @@ HOLD_ON_OFFBOARD_LOSS = 5
 """COM_OBL_RC_ACT: PX4's default, 0, sinks and lands where no sticks are."""
 
 OFFBOARD_LOSS_TIMEOUT_S = 1.0
-FASTEST_M_S = 20.0
-"""PX4 knows no MPC_XY_VEL_MAX above it."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +32,13 @@ class Requirement:
 
 def requirements(mission: Mission, speed: float) -> tuple[Requirement, ...]:
     """What a flight of `mission` needs; with a speed factor the autopilot's loss times are wall-clock times, too."""
-    timeout_s, fastest_m_s = OFFBOARD_LOSS_TIMEOUT_S * speed, min(mission.limits.cruise_speed_m_s, FASTEST_M_S)
+    timeout_s = OFFBOARD_LOSS_TIMEOUT_S * speed
     return (
         Requirement("COM_OBL_RC_ACT", HOLD_ON_OFFBOARD_LOSS, "hold when the companion's setpoints stop"),
         Requirement("COM_OF_LOSS_T", timeout_s, "notice soon that setpoints stop", less_is_fine=True),
         Requirement("NAV_DLL_ACT", 0, "fly on without a link to the ground"),
         Requirement("GF_MAX_VER_DIST", fence_height_m(mission), "the fence's height"),
-        Requirement("MPC_XY_VEL_MAX", fastest_m_s, "never faster than the mission"),
+        Requirement("MPC_XY_VEL_MAX", mission.limits.cruise_speed_m_s, "never faster than the mission"),
     )
 
 

@@ -1,7 +1,8 @@
 """Lines as a model in binary glTF, which browsers draw as plain lines of one pixel; pure.
 
 viser's own lines are ribbons, six triangles for each segment: right for a few vehicles, and most of what a machine
-without a graphics card has to draw for a hundred.
+without a graphics card has to draw for a hundred. trimesh could write the model, but takes 59 ms for 2560 segments,
+in which nothing else of the ground station has its turn; this is 0.4 ms.
 """
 
 import json

@@ -10,8 +10,11 @@ from aiohttp import ClientSession
 from gcs.view import client_answers, server
 from gcs.view.client_files import (
     ALPHABET,
+    CHECKED,
     KEPT,
     LIT,
+    RESTYLING,
+    UNCHECKED,
     UNLIT,
     ClientFile,
     UnknownClientError,
@@ -61,6 +64,12 @@ def test_its_scene_begins_without_lights_shadows_and_sky():
     script = contents(".js").decode()
     assert script.count(UNLIT) == 1
     assert LIT not in script
+
+
+def test_nothing_restyles_the_whole_page_or_waits_for_the_shaders_logs():
+    assert RESTYLING.search(contents(".css")) is None
+    assert contents(".js").count(UNCHECKED) == 1
+    assert CHECKED not in contents(".js")
 
 
 def test_the_page_names_files_that_are_there_and_carries_no_script_of_2_mb():

@@ -15,8 +15,10 @@ from gcs.view import page as page_module
 from gcs.view.lines import AHEAD, CHUNK
 from gcs.view.page import Page
 from gcs.view.server import close_server, open_server
+from gcs.view.vehicle_scene import MANY
 from gcs.view.wakening import SharedEvent
 from missions.tunnel import CompanionState
+from tests.benchmarks.view.circling_fleet import CirclingFleet
 from tests.browser.loopback import HOST, free_port
 from tests.browser.raw_client import raw_client
 from tests.browser.scripted_desk import ScriptedDesk
@@ -83,6 +85,26 @@ async def test_vehicles_are_drawn_where_they_are(
     shown.fly(0.5)
     moved = np.linalg.norm(node(browser, "/fleet/hull").batched_positions - before, axis=1)
     np.testing.assert_allclose(moved, 1.5, atol=0.1)  # 3 m/s
+
+
+async def test_who_comes_is_shown_the_vehicles_before_the_next_update(server: viser.ViserServer, indoor: ScriptedDesk):
+    Shown(server, indoor).fly(0.5)
+    async with raw_client(server.get_port()):
+        await until(lambda: len(server.get_clients()) == 1, "the page knows of the browser")
+        (newcomer,) = server.get_clients().values()
+        await until(lambda: newcomer.scene.get_handle_by_name("/fleet/hull") is not None, "it is shown the vehicles")
+
+
+@pytest.mark.parametrize(("count", "drawn_as"), [(MANY, viser.LineSegmentsHandle), (MANY + 1, viser.GlbHandle)])
+async def test_what_a_large_fleet_has_flown_is_drawn_as_plain_lines(server: viser.ViserServer, count, drawn_as):
+    fleet = CirclingFleet(count)
+    fleet.have_flown(120.0, 0.2)
+    page = Page(server, fleet.desk)
+    for now_s in (0.0, 0.1):
+        page.update(now_s)
+    sealed = [node(server, name) for name in names(server) if name.startswith("/trails/") and "newest" not in name]
+    assert sealed
+    assert {type(line) for line in sealed} == {drawn_as}
 
 
 async def test_a_trail_grows_behind_and_a_trajectory_lies_ahead(server: viser.ViserServer, indoor: ScriptedDesk):
