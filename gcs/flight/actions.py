@@ -9,6 +9,7 @@ FORCE = 21196.0
 """Disarm whatever the vehicle does: in flight it falls."""
 GROUND_SPEED, SAME_THROTTLE = 1.0, -1.0
 SAME_SPEED = -1.0
+CURRENT_ITEM = -1.0
 
 
 def arm() -> Command:
@@ -54,8 +55,11 @@ def set_mode(mode: Mode) -> Command:
 
 
 def start_mission() -> Command:
-    """To a companion: take control and fly; to an autopilot: fly the stored mission."""
-    return Command("start the mission", mavlink.MAV_CMD_MISSION_START)
+    """To a companion: take control and fly; to an autopilot: fly the stored mission from its current item on.
+
+    With a first item named, each late copy of the command would turn a vehicle back that has passed it.
+    """
+    return Command("start the mission", mavlink.MAV_CMD_MISSION_START, (CURRENT_ITEM,))
 
 
 def set_message_interval(message_id: int, rate_hz: float) -> Command:

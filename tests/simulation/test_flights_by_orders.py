@@ -68,6 +68,25 @@ def test_step_by_step_both_drones_reach_their_targets():
     assert system.flight.success
 
 
+def test_an_autopilot_that_is_told_to_start_again_does_not_turn_back():
+    """Be it a late copy on a slow link or somebody who goes on after a hold: soak seed 7018 hit the crate on its way back."""
+
+    async def start_again(operator: Operator) -> None:
+        flight = operator.desk.flight
+        assert flight is not None
+        await asyncio.sleep(4.0)
+        await flight.orders.start(flight.vehicles[1])
+        await operator.order(Intent.HOLD, [2])
+        await asyncio.sleep(2.0)
+        await operator.order(Intent.RESUME, [2])
+
+    system = fly(start_again)
+    assert system.flight.success
+    for flown in system.flown().values():
+        east_m = flown.positions_m[:, 0]
+        assert (np.maximum.accumulate(east_m) - east_m).max() < 1.5
+
+
 def test_held_and_resumed_with_their_companions_they_arrive_as_well():
     async def hold_and_resume(operator: Operator) -> None:
         await asyncio.sleep(4.0)
