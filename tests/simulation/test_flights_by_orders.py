@@ -69,7 +69,7 @@ def test_step_by_step_both_drones_reach_their_targets():
 
 
 def test_an_autopilot_that_is_told_to_start_again_does_not_turn_back():
-    """Be it a late copy on a slow link or somebody who goes on after a hold: soak seed 7018 hit the crate on its way back."""
+    """Be it a late copy on a slow link or a resumption: on its way back, soak seed 7018 hit the crate."""
 
     async def start_again(operator: Operator) -> None:
         flight = operator.desk.flight
