@@ -5,15 +5,14 @@ from pathlib import Path
 
 import msgspec
 
-from gcs.dialect import AUTOPILOT
 from gcs.errors import FlightAborted, GcsError
 from gcs.fleet.vehicle_state import LandedState, VehicleState
+from gcs.flight import upload
 from gcs.flight.events import EventLog, Severity
 from gcs.flight.journal import JOURNAL_FILE, Story, is_written, read_story
 from gcs.flight.sequence import FleetFlight
 from gcs.flight.vehicle_flight import VehicleFlight
 from gcs.microservices.mission_comparison import first_difference
-from gcs.microservices.mission_download import MissionDownload
 from gcs.planner.flown_plan import NO_FLOWN_PLAN, FlownPlan
 from gcs.planner.plan import FleetPlan
 from gcs.station import Station
@@ -86,7 +85,7 @@ async def _look(station: Station, part: VehicleFlight, events: EventLog) -> None
         part.monitor.give_up("not heard after the restart of the ground station")
         return
     try:
-        found = (await station.run(MissionDownload((part.sysid, AUTOPILOT)))).items
+        found = await upload.read(station, part.sysid)
     except GcsError as problem:
         events.add("rejoin", f"its mission could not be compared: {problem}", part.name, Severity.ERROR)
         return

@@ -36,6 +36,8 @@ class LinkQuality:
     """Share lost of what it sent in the last seconds, 0 to 1."""
     round_trip_s: float | None
     """None before the first answer."""
+    variation_s: float | None
+    """Mean variation of round trips; None before the second answer."""
     age_s: float
     """Since the last message of any kind."""
     received: int
@@ -49,6 +51,7 @@ class Path:
     heard_s: float = -math.inf
     count: SourceCount = field(default_factory=SourceCount)
     round_trip_s: float | None = None
+    variation_s: float | None = None
     boot_clock_s: float | None = None
     """The system's clock when this one's was 0, from its newest telemetry."""
     hardware_id: int | None = None
@@ -73,15 +76,23 @@ class Path:
         """An answer; one to a question that was not asked counts for nothing."""
         sent_s = self._pings.pop(stamp, None)
         if sent_s is not None:
-            took_s = now_s - sent_s
-            self.round_trip_s = took_s if self.round_trip_s is None else 0.75 * self.round_trip_s + 0.25 * took_s
+            self._learn(now_s - sent_s)
+
+    def _learn(self, took_s: float) -> None:
+        if self.round_trip_s is None:
+            self.round_trip_s = took_s
+            return
+        off_s = abs(took_s - self.round_trip_s)
+        self.variation_s = off_s if self.variation_s is None else 0.75 * self.variation_s + 0.25 * off_s
+        self.round_trip_s += 0.25 * (took_s - self.round_trip_s)
 
     def quality(self, now_s: float) -> LinkQuality:
         """Loss over the last `WINDOW_S`, and the rest as of now."""
         begin = next((mark for mark in self._marks if now_s - mark[0] <= WINDOW_S), (0.0, 0, 0))
         received, lost = self.count.received - begin[1], self.count.lost - begin[2]
         loss = min(max(lost / max(received + lost, 1), 0.0), 1.0)
-        return LinkQuality(loss, self.round_trip_s, now_s - self.heard_s, self.count.received, self.count.lost)
+        trip = self.round_trip_s, self.variation_s
+        return LinkQuality(loss, *trip, now_s - self.heard_s, self.count.received, self.count.lost)
 
 
 @dataclass

@@ -19,6 +19,7 @@ from gcs.microservices.mission_messages import (
     MISSION_TURN,
     PASSING_RESULTS,
     LinkEstimate,
+    copies_at,
     item_content,
 )
 from gcs.microservices.round_trip import LossEstimate, RoundTrip
@@ -40,6 +41,8 @@ SHORT_PASS, SHORT_PASSES = 40, 4
 """So many passes in a row that end before so many items: requests are overtaken on their way."""
 TRIES_OF_LAST, TRIES_ALONE = 3, 10
 """Repetitions of the last request before it is taken that the vehicle has dropped the download."""
+SPREAD = 8
+"""Times the mean variation of a round trip that frames which leave together may arrive apart."""
 
 
 @dataclass
@@ -88,7 +91,7 @@ class MissionDownload(Microservice):
     @property
     def learned(self) -> LinkEstimate:
         """The link as this transfer has found it."""
-        return LinkEstimate(self._round_trip.smoothed_s, self._one_way_loss)
+        return LinkEstimate(self._round_trip.smoothed_s, self._one_way_loss, self._round_trip.variation_s)
 
     def start(self, now_s: float) -> list[Message]:
         self._heard_s = now_s
@@ -108,13 +111,16 @@ class MissionDownload(Microservice):
                 return []
 
     def handle_timeout(self, now_s: float) -> list[Message]:
+        self._round_trip.miss()
         if now_s - self._heard_s > PATIENCE_S:
             self.done = True
             raise MissionTransferError(f"{self}: no answer after {len(self._found)} items")
         walk = self._pass
         if walk is None or now_s - walk.heard_s > FORGOTTEN_AFTER_S:
             return self._ask_for_list(now_s)
-        walk.drop_late(now_s - self._round_trip.timeout_s)
+        for late in walk.drop_late(now_s - self._round_trip.timeout_s):
+            if not self._keeps_order:  # otherwise the next answer tells that it is lost
+                self._loss.saw_lost(late.copies)
         if walk.in_flight:
             return self._fill(walk, now_s)
         return self._stalled(walk, now_s)
@@ -132,11 +138,12 @@ class MissionDownload(Microservice):
             self._short_passes = self._short_passes + 1 if self._pass.next_seq < SHORT_PASS else 0
             self._keeps_order = self._keeps_order and self._short_passes < SHORT_PASSES
             self._pass = None
-        self._list_s = now_s if self._lists == 0 else None  # no round-trip sample of repetitions
+        self._list_s = now_s if self._list_s is None else math.nan  # no sample of the second on: which one is answered?
         pause_s = self._round_trip.timeout_s * 1.5 ** min(self._lists, 8)
         self._lists += 1
         self.deadline_s = now_s + min(pause_s, max(LONGEST_PAUSE_S, self._round_trip.timeout_s))
-        return [mavlink.MAVLink_mission_request_list_message(*self.peer, self.mission_type)]
+        copies = copies_at(self._one_way_loss) if self._is_steady else 1
+        return [mavlink.MAVLink_mission_request_list_message(*self.peer, self.mission_type)] * copies
 
     def _counted(self, message: Message, now_s: float) -> list[Message]:
         if message.count > MAX_ITEMS:
@@ -148,7 +155,7 @@ class MissionDownload(Microservice):
             self._found.clear()  # another plan than in the pass before
             self._missing_until, self._led_to = message.count, 0
         self._count, self.opaque_id = message.count, message.opaque_id
-        if self._list_s is not None:
+        if self._list_s is not None and math.isfinite(self._list_s):
             self._round_trip.sample(now_s - self._list_s)
         self._heard_s, self._lists = now_s, 0
         walk = self._pass = _Pass(now_s)
@@ -205,9 +212,8 @@ class MissionDownload(Microservice):
         tries = TRIES_OF_LAST if self._keeps_order else TRIES_ALONE
         if last >= 0 and not answered and walk.tries < tries and self._is_worth_asking_again(last, end):
             walk.tries += 1
-            messages = self._request(
-                walk, last, min(2 * self._copies(last), MOST_COPIES) if self._keeps_order else 1, now_s
-            )
+            copies = min(2 * self._copies(last), MOST_COPIES) if self._may_copy else 1
+            messages = self._request(walk, last, copies, now_s)
             self.deadline_s = now_s + self._round_trip.timeout_s
             return messages
         if not answered:
@@ -228,10 +234,20 @@ class MissionDownload(Microservice):
     def _copies(self, seq: int) -> int:
         """So many that the work of a lost pass, times its likelihood, is about that of one more copy."""
         one_way = self._one_way_loss
-        if one_way < LEAST_LOSS or not self._keeps_order:
+        if one_way < LEAST_LOSS or not self._may_copy:
             return 1
         rate = -math.log(min(CAUTION * one_way, 0.9))
         return min(max(math.ceil(math.log((seq + PASS_COST) * rate) / rate), 1), MOST_COPIES)
+
+    @property
+    def _may_copy(self) -> bool:
+        return self._keeps_order or self._is_steady
+
+    @property
+    def _is_steady(self) -> bool:
+        """Whether all copies of a request arrive before one that is sent when the first of them is answered."""
+        trip = self._round_trip
+        return trip.smoothed_s is not None and SPREAD * trip.variation_s < trip.smoothed_s
 
     @property
     def _one_way_loss(self) -> float:
@@ -298,7 +314,7 @@ class _Pass:
         self.highest_answered = max(self.highest_answered, seq)
         self.heard_s, self.tries = now_s, 0
 
-    def drop_late(self, before_s: float) -> None:
-        """Stop waiting for what was sent so long ago."""
-        for seq in [seq for seq, flight in self.in_flight.items() if flight.sent_s <= before_s + 1e-6]:
-            del self.in_flight[seq]
+    def drop_late(self, before_s: float) -> list[_InFlight]:
+        """Stop waiting for what was sent so long ago; returns what that is."""
+        late = [seq for seq, flight in self.in_flight.items() if flight.sent_s <= before_s + 1e-6]
+        return [self.in_flight.pop(seq) for seq in late]

@@ -15,6 +15,8 @@ MISSION_TURN = "mission"
 """A vehicle takes part in one transfer at a time."""
 MOST_IN_FLIGHT = 16
 """Frames under way at once, copies included: 0.8 kB of items."""
+TWO_COPIES_FROM, THREE_COPIES_FROM = 0.25, 0.45
+"""Loss from which a frame is sent more than once at a time: fewer round trips for the same number of frames."""
 FORGOTTEN_AFTER_S = 5.0
 """A PX4 forgets a transfer after so much silence, says nothing to what belongs to it, and keeps the old plan."""
 MAX_ITEMS = 10_000
@@ -38,13 +40,22 @@ class LinkEstimate:
 
     round_trip_s: float | None = None
     loss: float = 0.0
+    variation_s: float | None = None
+    """Of the round trip; None where one sample is all that there is."""
 
     def round_trip(self) -> RoundTrip:
-        known_s = self.round_trip_s
-        return RoundTrip(known_s, known_s / 4) if known_s is not None else RoundTrip()
+        known_s, variation_s = self.round_trip_s, self.variation_s
+        if known_s is None:
+            return RoundTrip()
+        return RoundTrip(known_s, known_s / 4 if variation_s is None else variation_s)
 
     def loss_estimate(self) -> LossEstimate:
         return LossEstimate(self.loss, 10 if self.loss else 0)
+
+
+def copies_at(loss: float) -> int:
+    """In how many copies a frame is sent at once on a link that loses this share."""
+    return 1 + (loss >= TWO_COPIES_FROM) + (loss >= THREE_COPIES_FROM)
 
 
 def item_message(item: MissionItem, seq: int, peer: tuple[int, int], mission_type: int) -> Message:

@@ -20,6 +20,7 @@ from gcs.microservices.mission_messages import (
     MOST_IN_FLIGHT,
     PASSING_RESULTS,
     LinkEstimate,
+    copies_at,
     item_message,
 )
 from gcs.microservices.round_trip import LossEstimate, RoundTrip
@@ -37,8 +38,6 @@ WINDOW_OF_LOSS = 0.6
 SAME_BURST_S = 0.005
 LEAST_WINDOW = 3
 """A vehicle answers nothing to an item that it has: only the ones behind it show that its request was lost."""
-TWO_COPIES_FROM, THREE_COPIES_FROM = 0.25, 0.45
-"""Loss from which each item is sent more than once at a time: fewer round trips for the same number of frames."""
 ERRORS_THAT_COUNT = 2
 
 
@@ -101,7 +100,7 @@ class MissionUpload(Microservice):
     @property
     def learned(self) -> LinkEstimate:
         """The link as this transfer has found it."""
-        return LinkEstimate(self._round_trip.smoothed_s, self._loss.share)
+        return LinkEstimate(self._round_trip.smoothed_s, self._loss.share, self._round_trip.variation_s)
 
     def start(self, now_s: float) -> list[Message]:
         self._heard_s = now_s
@@ -117,6 +116,7 @@ class MissionUpload(Microservice):
         return self._requested(message.seq, now_s)
 
     def handle_timeout(self, now_s: float) -> list[Message]:
+        self._round_trip.miss()
         if now_s - self._heard_s > PATIENCE_S:
             self.done = True
             raise MissionTransferError(f"{self}: no answer after {self.taken} of {len(self.items)} items")
@@ -195,7 +195,7 @@ class MissionUpload(Microservice):
     def _size_window(self) -> None:
         """As many frames as are likely to get through without a loss, at most `MOST_IN_FLIGHT` under way."""
         loss = self._loss.share
-        self._copies = 1 + (loss >= TWO_COPIES_FROM) + (loss >= THREE_COPIES_FROM)
+        self._copies = copies_at(loss)
         until_loss = WINDOW_OF_LOSS / max(loss**self._copies, 1e-3)
         self._window = max(LEAST_WINDOW, min(MOST_IN_FLIGHT // self._copies, math.ceil(until_loss)))
 

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcs.errors import MissionTransferError
-from gcs.flight.upload import store
+from gcs.flight.upload import read, store
 from gcs.microservices.mission_comparison import first_difference
-from gcs.microservices.mission_download import MissionDownload
 from gcs.microservices.mission_messages import FENCE, MISSION
 from missions.mission import LinkSettings, load_mission
 from missions.mission_items import MissionItem
@@ -38,17 +37,20 @@ def vertices(n: int) -> list[MissionItem]:
     return [msgspec.structs.replace(item, command=5001, param1=float(n), param2=0.0) for item in waypoints(n, 0)]
 
 
-async def transfer(system: WholeSystem, items: list[MissionItem], kind: int) -> list[MissionItem] | None:
+async def transfer(
+    system: WholeSystem, items: list[MissionItem], kind: int, wait_s: float = 1.5
+) -> list[MissionItem] | None:
     """Store items on vehicle 1; what is really there afterwards, or None if the client gave up."""
-    simulating = asyncio.create_task(system.simulate())
-    await asyncio.sleep(1.5)
+    background = [asyncio.create_task(system.simulate()), asyncio.create_task(system.station.send_heartbeats())]
+    await asyncio.sleep(wait_s)
     try:
         await store(system.station, 1, items, kind)
-        return (await system.station.run(MissionDownload((1, 1), kind))).items
+        return await read(system.station, 1, kind)
     except MissionTransferError:
         return None
     finally:
-        simulating.cancel()
+        for task in background:
+            task.cancel()
 
 
 @pytest.mark.parametrize(("kind", "items"), [(MISSION, waypoints(12, 0)), (FENCE, vertices(4))])
@@ -78,3 +80,12 @@ def test_a_third_lost_and_the_rest_out_of_order_does_not_keep_a_mission_from_bei
     system = system_with(LinkSettings(loss=0.33, delay_s=0.1, jitter_s=0.1), seed)
     stored = virtual_time.run(transfer(system, waypoints(10, 0), MISSION))
     assert stored is not None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_on_a_slow_link_that_loses_half_and_keeps_no_order_a_mission_takes_minutes_and_not_for_ever(seed: int):
+    """Reading back went on for more than 20 minutes in soak seed 7107: one request at a time, in one copy each."""
+    system = system_with(LinkSettings(loss=0.5, delay_s=1.0, jitter_s=0.2, reorder=0.1, duplicates=0.1), seed)
+    stored = virtual_time.run(transfer(system, waypoints(9, 0), MISSION, wait_s=20.0))
+    assert stored is not None
+    assert system.simulator.time_s < 300.0
