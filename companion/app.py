@@ -139,31 +139,31 @@ class App:
         loop = asyncio.get_running_loop()
         due_s = loop.time()
         while True:
-            due_s = max(due_s + self.settings.pilot.tick_s / self._clock.pace, loop.time() - BEHIND_S)
+            due_s = max(due_s + self.pilot.tick_s / self._clock.pace, loop.time() - BEHIND_S)
             await asyncio.sleep(due_s - loop.time())
-            late_s, age_s = loop.time() - due_s, self._clock.age_s(loop.time())
+            late_s, age_s, now_s = loop.time() - due_s, self._clock.age_s(loop.time()), self._now_s
             if self.fleet is not None:
-                self.fleet.listen(self._now_s)
-            self._handle(events.Tick(age_s, lateness_ms=late_s * 1e3, sensor_silent=self._look()))
+                self.fleet.listen(now_s)
+            self._handle(events.Tick(age_s, lateness_ms=late_s * 1e3, sensor_silent=self._look(now_s)))
             if self.fleet is not None:
-                self.fleet.speak(self.pilot.briefing.frame, self._now_s)
+                self.fleet.speak(self.pilot.briefing.frame, now_s)
             if self.pilot.in_control:
                 self.deadman.feed()
             else:
                 self.deadman.disarm()
-            self.faults.tick(in_control=self.pilot.in_control, now_s=self._now_s)
+            self.faults.tick(in_control=self.pilot.in_control, now_s=now_s)
 
-    def _look(self) -> bool:
+    def _look(self, now_s: float) -> bool:
         """Let the planner see what the sensor has seen; whether the sensor is silent."""
         if self.sensing is None:
             return False
-        scan = self.sensing.look(self.pilot.briefing.frame, self._now_s)
+        scan = self.sensing.look(self.pilot.briefing.frame, now_s)
         if scan is not None:
             self._unseen = scan  # one that the planner had no time for is overtaken
             if not self._observing:
                 self._observing = True
                 self._later(self._observe())
-        return self.sensing.is_silent(self._now_s)
+        return self.sensing.is_silent(now_s)
 
     async def _observe(self) -> None:
         """Show scans to the planner until there is none."""

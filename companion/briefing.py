@@ -49,6 +49,8 @@ class Briefing:
     """Of the mission that the autopilot has stored; 0 for none."""
     current_seq: int = 0
     items: tuple[MissionItem, ...] = ()
+    plan_id: int = 0
+    """Of the items; 0 for none."""
     downloaded_identity: int = 0
     problem: str = ""
     """Why the mission was not understood."""
@@ -60,7 +62,7 @@ class Briefing:
         """The autopilot is gone, perhaps rebooted: everything that it said is void."""
         self.origin = self.home = self._order = None
         self.identity = self.downloaded_identity = self.current_seq = 0
-        self.items, self.problem = (), ""
+        self.items, self.plan_id, self.problem = (), 0, ""
 
     @property
     def ground_offset_m(self) -> float:
@@ -76,17 +78,12 @@ class Briefing:
         return AutopilotFrame(self.origin, self.mission.frame, self.ground_offset_m)
 
     @property
-    def plan_id(self) -> int:
-        """Of the mission that was downloaded last; 0 for none."""
-        return plan_id(self.items)
-
-    @property
     def wants_download(self) -> bool:
         return self.identity not in (0, self.downloaded_identity)
 
     def accept(self, identity: int, items: tuple[MissionItem, ...]) -> None:
         """Take over a downloaded mission."""
-        self.downloaded_identity, self.items = identity, items
+        self.downloaded_identity, self.items, self.plan_id = identity, items, plan_id(items)
         self.decode()
 
     def decode(self) -> None:

@@ -21,7 +21,7 @@ from companion.instructions import CommandResult, Instruction
 from companion.planner.planner import Plan, Planner
 from companion.settings import CompanionSettings
 from companion.start_answer import Situation, answer
-from companion.states import UNDER_WAY, State, assert_possible
+from companion.states import RESTING, UNDER_WAY, State, assert_possible
 from companion.status import StatusDesk
 from companion.utc_clock import UtcClock
 from companion.vehicle_clock import REBOOT_S
@@ -88,6 +88,11 @@ class Pilot:
     def in_control(self) -> bool:
         """Setpoints are being streamed."""
         return self._flight is not None or (self._engagement is not None and self._engagement.plan is not None)
+
+    @property
+    def tick_s(self) -> float:
+        """How soon it wants the next Tick."""
+        return self._settings.resting_tick_s if self.state in RESTING else self._settings.tick_s
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
         """Take in one event at vehicle time `now_s`; what is to be done about it, in order."""

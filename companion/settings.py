@@ -62,6 +62,9 @@ class PilotSettings:
     """When the pilot does what; vehicle time unless said."""
 
     tick_s: float = 0.02
+    """While setpoints are streamed, or soon will be."""
+    resting_tick_s: float = 0.1
+    """While nothing is flown: what is heard is taken in at once all the same."""
     status_interval_s: float = 0.2
     report_interval_s: float = 0.2
     """Between two looks at the map for what the ground does not know of yet."""

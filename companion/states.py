@@ -23,6 +23,9 @@ TRANSITIONS: dict[State, frozenset[State]] = {
 UNDER_WAY = frozenset({State.ENGAGING, State.FLYING, State.LANDING})
 """A MISSION_START in these has been obeyed already."""
 
+RESTING = frozenset({State.CONNECTING, State.WAITING, State.READY, State.FINISHED, State.RELEASED})
+"""Nothing is streamed in these, and nothing is about to be."""
+
 
 def assert_possible(before: State, after: State, reason: Reason) -> None:
     """A transition that is not in the table is an error of ours.

@@ -44,16 +44,30 @@ MODES = {
 }
 
 
+GROUND_READS = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+}
+"""What the ground station makes its picture of a vehicle of, of what is streamed."""
+
+
 def quieten(simulator: Simulator, sysid: int) -> None:
-    """Switch off what a vehicle streams on its onboard link and nobody here reads: most of all messages.
+    """Switch off what a vehicle streams and nobody here reads: most of all messages.
 
     Distances around are streamed again when a companion asks for them.
     """
-    codec = Codec(sysid, COMPANION)
-    for message_id in STREAMED_BY_ID.keys() - (EVENTS - {OBSTACLE_DISTANCE}) - ANSWERS:
-        off = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, float(message_id), -1.0
-        command = mavlink.MAVLink_command_long_message(sysid, AUTOPILOT, *off, 0.0, 0.0, 0.0, 0.0, 0.0)
-        simulator.receive(sysid, Link.ONBOARD, codec.pack(command))
+    codec, vehicle = Codec(sysid, COMPANION), simulator.vehicles[sysid]
+    for link, read in ((Link.ONBOARD, (EVENTS - {OBSTACLE_DISTANCE}) | ANSWERS), (Link.GROUND, GROUND_READS)):
+        for message_id in STREAMED_BY_ID.keys() - read:
+            off = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, float(message_id), -1.0
+            command = mavlink.MAVLink_command_long_message(sysid, AUTOPILOT, *off, 0.0, 0.0, 0.0, 0.0, 0.0)
+            vehicle.receive(link, codec.pack(command))
+    vehicle.take()  # its answers
 
 
 class OnboardWire:
@@ -201,5 +215,5 @@ def _as_mavsdk_has_it(message: Any) -> bytes:
 
 def _without_nan(value: Any) -> Any:
     if isinstance(value, list):
-        return [_without_nan(part) for part in value]
+        return [None if part != part else part for part in value]
     return None if isinstance(value, float) and math.isnan(value) else value
