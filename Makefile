@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link experiment-modes soak fuzz bench-view screenshots check docs dist check-dist format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link bench-load experiment-modes soak fuzz bench-view screenshots check docs dist check-dist format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -70,6 +70,10 @@ bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, alone (50 seeds a
 
 bench-link: $(VENV)/.installed-dev  ## missions over lossy links beside MAVSDK and MAVProxy, and a fleet of a hundred: make bench-link SEEDS=0:30 [BENCH=--quick]
 	$(BIN)/python -m tests.benchmarks.link --seeds $(SEEDS) $(BENCH)
+
+MINUTES ?= 10
+bench-load: $(VENV)/.installed-dev  ## 100 vehicles for minutes: memory of simulator and ground station, what waits, what is lost: make bench-load MINUTES=10
+	$(BIN)/python -m tests.benchmarks.load --minutes $(MINUTES) $(BENCH)
 
 SEED0 ?= 0
 soak: $(VENV)/.installed-dev  ## whole flights with everything going wrong, in process: make soak SEEDS=100 [SEED0=M]

@@ -103,4 +103,4 @@ def _trail(way: Way, frame: LocalFrame, count: int, ground_offset_m: float) -> T
     """What was written of a way before record `count`."""
     seen = int((way.records < count).sum())
     positions_m = way.positions_m(frame, ground_offset_m)[:seen]
-    return Trail(way.times_s[:seen].tolist(), list(positions_m), list(way.velocities_m_s[:seen]))
+    return Trail.of(way.times_s[:seen], positions_m, way.velocities_m_s[:seen])

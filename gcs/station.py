@@ -27,6 +27,8 @@ from gcs.security.audit import Audit
 from missions.tunnel import MAX_PAYLOAD_BYTES, PayloadType, Receipt, encode_receipt
 
 HEARTBEAT_INTERVAL_S = 1.0
+STOOD_STILL_S = 0.5
+"""A look at the fleet that comes later than this is one after a standstill, not one on a busy machine."""
 MOST_NOTICES, NOTICES_WINDOW_S = 20, 10.0
 """Sentences about the links; of more at once the rest is counted."""
 BULK = frozenset({"MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_SET", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST"})
@@ -141,12 +143,18 @@ class Station:
             await asyncio.sleep(HEARTBEAT_INTERVAL_S)
 
     async def holds_within(self, condition: Callable[[], bool], timeout_s: float, poll_s: float = 0.02) -> bool:
-        """Wait until something holds in the fleet's state; False if it did not within `timeout_s`."""
+        """Wait until something holds in the fleet's state; False if it did not within `timeout_s`.
+
+        Time in which this program stood still does not count: what came meanwhile has not been read yet.
+        """
         deadline_s = self.now_s + timeout_s
         while not condition():
-            if self.now_s >= deadline_s:
+            looked_s = self.now_s
+            if looked_s >= deadline_s:
                 return False
             await asyncio.sleep(poll_s)
+            late_s = self.now_s - looked_s - poll_s
+            deadline_s += late_s if late_s > STOOD_STILL_S else 0.0
         return True
 
     async def wait_until(self, condition: Callable[[], bool], timeout_s: float, otherwise: str) -> None:
@@ -192,7 +200,9 @@ class Station:
     def link_estimate(self, sysid: int) -> LinkEstimate:
         """What is known of the way to a vehicle, for a transfer that begins."""
         quality = self.quality(sysid)
-        return LinkEstimate(quality.round_trip_s, quality.loss) if quality is not None else LinkEstimate()
+        if quality is None:
+            return LinkEstimate()
+        return LinkEstimate(quality.round_trip_s, quality.loss, quality.variation_s)
 
     def vehicles_on_link_of(self, sysid: int) -> tuple[int, float | None]:
         """How many systems share the connection over which `sysid` is reached, and its budget [bytes/s]."""

@@ -1,7 +1,9 @@
 """Where each vehicle has been, by its own account, for reports, pictures and the page."""
 
 import math
+from array import array
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -12,33 +14,44 @@ from missions.frames import LocalFrame
 
 Array = npt.NDArray[np.float64]
 
+Numbers: TypeAlias = "array[float]"
+
 MAX_SAMPLES = 200_000
+
+
+def _numbers() -> Numbers:
+    return array("d")
 
 
 @dataclass
 class Trail:
-    """One vehicle's way: times of its own clock [s], ENU positions [m] and velocities [m/s]."""
+    """One vehicle's way: times of its own clock [s], ENU positions [m] and velocities [m/s]; 56 bytes a sample."""
 
-    times_s: list[float] = field(default_factory=list[float])
-    _positions_m: list[Array] = field(default_factory=list[Array])
-    _velocities_m_s: list[Array] = field(default_factory=list[Array])
+    times_s: Numbers = field(default_factory=_numbers)
+    _positions_m: Numbers = field(default_factory=_numbers)
+    _velocities_m_s: Numbers = field(default_factory=_numbers)
+
+    @classmethod
+    def of(cls, times_s: Array, positions_m: Array, velocities_m_s: Array) -> "Trail":
+        """A trail of (n,) times [s], (n, 3) positions [m] and (n, 3) velocities [m/s]."""
+        return cls(*(array("d", table.astype(float).tobytes()) for table in (times_s, positions_m, velocities_m_s)))
 
     def append(self, time_s: float, position_m: Array, velocity_m_s: Array) -> None:
         """Add a sample, (3,) ENU [m] and [m/s]; of a flight that is too long, the end is left out."""
         if len(self.times_s) >= MAX_SAMPLES:
             return
         self.times_s.append(time_s)
-        self._positions_m.append(position_m)
-        self._velocities_m_s.append(velocity_m_s)
+        self._positions_m.extend(position_m.tolist())
+        self._velocities_m_s.extend(velocity_m_s.tolist())
 
     @property
     def newest_m(self) -> Array:
         """(3,) ENU [m], of the last sample."""
-        return self._positions_m[-1]
+        return np.array(self._positions_m[-3:])
 
     def positions_m(self, first: int = 0) -> Array:
         """(n, 3) ENU [m], from sample `first` on."""
-        return np.array(self._positions_m[first:]).reshape(-1, 3)
+        return np.array(self._positions_m[3 * first :]).reshape(-1, 3)
 
     def velocities_m_s(self) -> Array:
         """(n, 3) ENU [m/s]."""

@@ -5,6 +5,8 @@ import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,8 +59,11 @@ def truth_of(directory: Path) -> dict[int, Flown]:
     return read_truth(directory / "truth.csv")
 
 
-def promises_broken(directory: Path, name: str = "indoor") -> list[str]:
-    """What the first flight promises, judged from the truth log alone; a sentence for each broken promise."""
+def promises_broken(directory: Path, name: str = "indoor", *, broken_off: Collection[str] = ()) -> list[str]:
+    """What the first flight promises, judged from the truth log alone; a sentence for each broken promise.
+
+    Of vehicles whose flight was broken off no arrival is promised.
+    """
     mission = load_mission(name)
     solid, broken = obstacles.pack(mission.world), []
     flown = {sysid: part.in_flight() for sysid, part in truth_of(directory).items()}
@@ -75,7 +80,7 @@ def promises_broken(directory: Path, name: str = "indoor") -> list[str]:
             (clearance_m.min() >= 0.3, f"clearance {clearance_m.min():.2f} m"),
             (speed_m_s.max() <= 3.0, f"speed {speed_m_s.max():.2f} m/s"),
             (near_m_s <= 1.2, f"speed {near_m_s:.2f} m/s near an obstacle"),
-            (missed_m <= 0.5, f"landed {missed_m:.2f} m from its target"),
+            (missed_m <= 0.5 or vehicle.name in broken_off, f"landed {missed_m:.2f} m from its target"),
             (part.positions_m[-1][2] < 0.1, f"ended {part.positions_m[-1][2]:.2f} m above the ground"),
         ]
         broken += [f"{vehicle.name}: {what}" for kept, what in checks if not kept]
@@ -83,9 +88,9 @@ def promises_broken(directory: Path, name: str = "indoor") -> list[str]:
     return broken if separation_m >= 0.6 else [*broken, f"separation {separation_m:.2f} m"]
 
 
-def processes_of(base: int) -> list[str]:
-    """Command lines of simulators and companions on these ports that are still alive."""
-    found = []
+def processes_of(base: int) -> dict[int, str]:
+    """Process ids and command lines of simulators and companions on these ports that are still alive."""
+    found: dict[int, str] = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
@@ -93,8 +98,25 @@ def processes_of(base: int) -> list[str]:
             except OSError:
                 continue
             if f"--instance-base {base} " in f"{line} " and ("-m sitl" in line or "-m companion" in line):
-                found.append(line)
+                found[int(entry.name)] = line
     return found
+
+
+def none_left(base: int, within_s: float) -> bool:
+    """Whether all simulators and companions on these ports end within a time."""
+    deadline_s = time.monotonic() + within_s
+    while processes_of(base):
+        if time.monotonic() > deadline_s:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+def lines_of(path: Path) -> list[dict[str, Any]]:
+    """The whole lines of a JSON-lines file; none before it is there."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
 
 
 def end(process: "subprocess.Popen[str]") -> None:

@@ -4,7 +4,6 @@ import os
 import signal
 import socket
 import subprocess
-import time
 from pathlib import Path
 
 import msgspec
@@ -28,7 +27,7 @@ def test_the_indoor_mission_is_flown_and_its_promises_are_kept(tmp_path: Path):
     assert (tmp_path / "flight.png").read_bytes().startswith(b"\x89PNG")
     kinds = {msgspec.json.decode(line)["kind"] for line in (tmp_path / "events.jsonl").read_text().splitlines()}
     assert kinds >= {"connected", "planned", "uploaded", "hovering", "started", "phase"}
-    assert programs.processes_of(programs.instance_base()) == []
+    assert not programs.processes_of(programs.instance_base())
 
 
 def test_the_recording_holds_both_directions_and_is_readable_by_other_programs(tmp_path: Path):
@@ -90,7 +89,7 @@ def test_a_companion_that_dies_or_hangs_leaves_its_vehicle_holding(tmp_path: Pat
     flown = programs.truth_of(tmp_path)[1]
     heights_m = flown.positions_m[(flown.times_s >= fault_s) & (flown.times_s <= fault_s + held_s), 2]
     assert heights_m[0] - heights_m.min() <= 0.5
-    assert programs.processes_of(programs.instance_base()) == []
+    assert not programs.processes_of(programs.instance_base())
 
 
 def started_flight(directory: Path) -> "subprocess.Popen[str]":
@@ -110,15 +109,6 @@ def wait_for_line(process: "subprocess.Popen[str]", text: str) -> None:
     raise AssertionError("".join(lines))
 
 
-def none_left(base: int, within_s: float) -> bool:
-    deadline_s = time.monotonic() + within_s
-    while programs.processes_of(base):
-        if time.monotonic() > deadline_s:
-            return False
-        time.sleep(0.1)
-    return True
-
-
 def test_ctrl_c_in_flight_leaves_the_vehicles_holding_and_no_process_behind(tmp_path: Path):
     process = started_flight(tmp_path)
     try:
@@ -127,7 +117,7 @@ def test_ctrl_c_in_flight_leaves_the_vehicles_holding_and_no_process_behind(tmp_
         assert process.wait(timeout=20) == 130
     finally:
         programs.end(process)
-    assert none_left(programs.instance_base(), within_s=1.0)
+    assert programs.none_left(programs.instance_base(), within_s=1.0)
     texts = (tmp_path / "events.jsonl").read_text()
     assert "Hold for all vehicles in flight" in texts
 
@@ -139,7 +129,7 @@ def test_when_the_ground_station_is_killed_nothing_that_it_started_survives(tmp_
         process.send_signal(signal.SIGKILL)
     finally:
         programs.end(process)
-    assert none_left(programs.instance_base(), within_s=10.0)
+    assert programs.none_left(programs.instance_base(), within_s=10.0)
 
 
 @pytest.mark.parametrize(
@@ -153,4 +143,4 @@ def test_a_port_in_use_is_named_and_nothing_is_left_running(tmp_path: Path, port
     assert finished.code == 2, finished.output
     assert str(port + base) in finished.output
     assert "Traceback" not in finished.output
-    assert none_left(base, within_s=1.0)
+    assert programs.none_left(base, within_s=1.0)

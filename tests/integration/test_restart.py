@@ -1,12 +1,10 @@
 """A ground station is killed in flight; the next one finds its way back, and commands nothing."""
 
-import json
 import os
 import signal
 import subprocess
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,13 +12,6 @@ from tests.integration import programs
 
 SPEED = "2"
 PATIENCE_S = 120.0
-
-
-def lines_of(path: Path) -> list[dict[str, Any]]:
-    """The whole lines of a JSON-lines file; none before it is there."""
-    if not path.exists():
-        return []
-    return [json.loads(line) for line in path.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
 
 
 def started(*arguments: str) -> "subprocess.Popen[str]":
@@ -33,11 +24,12 @@ def started(*arguments: str) -> "subprocess.Popen[str]":
 def wait_until_flying(journal: Path, vehicles: int) -> None:
     deadline_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline_s:
-        flying = {r["sysid"] for r in lines_of(journal) if r["type"] == "progressed" and r["phase"] == "flying"}
+        progress = [entry for entry in programs.lines_of(journal) if entry["type"] == "progressed"]
+        flying = {entry["sysid"] for entry in progress if entry["phase"] == "flying"}
         if len(flying) == vehicles:
             return
         time.sleep(0.1)
-    raise AssertionError(f"not flying after {PATIENCE_S:g} s: {lines_of(journal)[-3:]}")
+    raise AssertionError(f"not flying after {PATIENCE_S:g} s: {programs.lines_of(journal)[-3:]}")
 
 
 @pytest.mark.processes
@@ -50,7 +42,7 @@ def test_a_killed_ground_station_finds_back_into_the_flight_and_commands_nothing
         wait_until_flying(tmp_path / "journal.jsonl", vehicles=2)
         os.kill(first.pid, signal.SIGKILL)
         first.wait()
-        orders = [entry for entry in lines_of(tmp_path / "audit.jsonl") if entry["type"] == "order"]
+        orders = [entry for entry in programs.lines_of(tmp_path / "audit.jsonl") if entry["type"] == "order"]
         recorded = (tmp_path / "flight.tlog").stat().st_size
         second = started(*flight)
         output = second.communicate(timeout=PATIENCE_S)[0]
@@ -61,7 +53,7 @@ def test_a_killed_ground_station_finds_back_into_the_flight_and_commands_nothing
     assert second.returncode == 0, output
     assert "the last ground station left alpha, bravo in flight" in output
     assert output.count("of the uploaded mission") == 2
-    assert [entry for entry in lines_of(tmp_path / "audit.jsonl") if entry["type"] == "order"] == orders
+    assert [entry for entry in programs.lines_of(tmp_path / "audit.jsonl") if entry["type"] == "order"] == orders
     assert programs.report_of(tmp_path)["success"]
     assert (tmp_path / "flight.tlog").stat().st_size > recorded
-    assert lines_of(tmp_path / "journal.jsonl")[-1]["type"] == "ended"
+    assert programs.lines_of(tmp_path / "journal.jsonl")[-1]["type"] == "ended"

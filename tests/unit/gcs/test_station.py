@@ -1,6 +1,7 @@
 """The station between its connections and its microservices."""
 
 import asyncio
+import time
 
 import pytest
 
@@ -349,3 +350,20 @@ def test_a_companion_is_told_how_much_of_what_it_saw_is_heard():
 
 def tunnel_message(kind: PayloadType, payload: bytes) -> mavlink.MAVLink_tunnel_message:
     return mavlink.MAVLink_tunnel_message(0, 0, kind, len(payload), list(payload.ljust(128, b"\0")))
+
+
+async def arrives_after_standstill(stands_still_s: float, later_s: float) -> bool:
+    """Whether what comes so much after the station itself stood still has come in time."""
+    loop, arrived = asyncio.get_running_loop(), list[bool]()
+
+    def stand_still() -> None:
+        time.sleep(stands_still_s)
+        loop.call_later(later_s, arrived.append, True)
+
+    loop.call_later(0.05, stand_still)
+    return await Station().holds_within(lambda: bool(arrived), 0.5)
+
+
+def test_time_in_which_the_station_itself_stood_still_is_nobody_elses_delay():
+    assert asyncio.run(arrives_after_standstill(1.5, later_s=0.1))
+    assert not asyncio.run(arrives_after_standstill(1.5, later_s=2.0))
