@@ -42,7 +42,9 @@ SHORT_PASS, SHORT_PASSES = 40, 4
 TRIES_OF_LAST, TRIES_ALONE = 3, 10
 """Repetitions of the last request before it is taken that the vehicle has dropped the download."""
 SPREAD = 8
-"""Times the mean variation of a round trip that frames which leave together may arrive apart."""
+"""Times the mean variation of a round trip that frames which leave together may arrive apart ..."""
+LATECOMERS_S = 0.3
+"""... and so much more: what a link holds back, or sends twice, does not show in the answers that come first."""
 
 
 @dataclass
@@ -247,7 +249,7 @@ class MissionDownload(Microservice):
     def _is_steady(self) -> bool:
         """Whether all copies of a request arrive before one that is sent when the first of them is answered."""
         trip = self._round_trip
-        return trip.smoothed_s is not None and SPREAD * trip.variation_s < trip.smoothed_s
+        return trip.smoothed_s is not None and SPREAD * trip.variation_s + LATECOMERS_S < trip.smoothed_s
 
     @property
     def _one_way_loss(self) -> float:

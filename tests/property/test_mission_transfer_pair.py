@@ -89,3 +89,12 @@ def test_on_a_slow_link_that_loses_half_and_keeps_no_order_a_mission_takes_minut
     stored = virtual_time.run(transfer(system, waypoints(9, 0), MISSION, wait_s=20.0))
     assert stored is not None
     assert system.simulator.time_s < 300.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_copies_that_the_link_itself_makes_and_delays_do_not_keep_a_mission_from_being_stored(seed: int):
+    """Requests in copies on a quick link that doubles some of them, 50 ms later: soak seed 7212 never ended."""
+    system = system_with(LinkSettings(loss=0.1, jitter_s=0.02, duplicates=0.1, corruption=0.01), seed)
+    stored = virtual_time.run(transfer(system, waypoints(10, 0), MISSION, wait_s=10.0))
+    assert stored is not None
+    assert system.simulator.time_s < 60.0

@@ -1,15 +1,23 @@
 """What holds in every flight, whatever goes wrong; each violation is a sentence."""
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 
 from gcs.fleet.vehicle_state import LandedState
 from gcs.flight.monitor import Phase
 from gcs.flight.report import FlightReport
 from missions.faults import GpsLoss, MotorFailure, Reboot, SensorNoise, SimulatorFault, Weather
+from sitl.autopilot.modes import Mode
+from sitl.fleet import TICK_S
+from tests.soak.census import crowds
 from tests.soak.scenario import Scenario
 from tests.soak.troubled_system import TroubledSystem
+
+Array = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 FALLING = (MotorFailure, Reboot)
 """Whoever has this falls, and may fall onto anything."""
@@ -22,6 +30,18 @@ SPEED_SHARE = 1.05
 ARRIVAL_SLACK_M = 0.3
 """Estimates are wrong by so much."""
 
+AIRBORNE_M = 0.3
+SEPARATION_SHARE = 0.8
+"""Of the mission's separation: plans keep it, tracking errors come on top."""
+ACCELERATION_WINDOW_S = 0.2
+ACCELERATION_SHARE = 1.5
+"""Of the mission's limit, which is what is planned with: in brakings the autopilot's own corrections come on top."""
+AUTOPILOTS_ACCELERATION_M_S2 = 5.5
+"""MPC_ACC_HOR_MAX is 5."""
+TAKING_OVER_S = 0.5
+MOST_KEPT = 500
+"""Things in any one container of a program, after minutes of flight."""
+
 
 def violations(scenario: Scenario, system: TroubledSystem, report: FlightReport) -> list[str]:
     """All that should not have happened, a sentence each."""
@@ -30,7 +50,11 @@ def violations(scenario: Scenario, system: TroubledSystem, report: FlightReport)
         *_out_of_bounds(scenario, system),
         *_too_fast(scenario, system),
         *_beliefs(scenario, system),
+        *_too_near(scenario, system),
+        *_too_hard(scenario, system),
         *(f"believed to be stored, and was not: {belief}" for belief in system.false_beliefs),
+        *system.mistakes,
+        *(f"{path} holds {number} things" for path, number in crowds(_kept(system), MOST_KEPT)),
         *_endings(scenario, system, report),
     ]
 
@@ -65,6 +89,54 @@ def _too_fast(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
         fastest_m_s = float(np.linalg.norm(flown.velocities_m_s[:, :2], axis=1).max(initial=0.0))
         if fastest_m_s > limit_m_s:
             yield f"vehicle {sysid} flew {fastest_m_s:.2f} m/s"
+
+
+def _too_near(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
+    """Companions keep their vehicles apart in the air; autopilots that fly missions by themselves see nobody."""
+    if not scenario.mode.needs_companions:
+        return
+    least_m = SEPARATION_SHARE * scenario.truth.limits.separation_m
+    for (one, there), (other, here) in combinations(system.flown().items(), 2):
+        if any(excused(scenario, sysid, FALLING + ASTRAY + PUSHED) for sysid in (one, other)):
+            continue
+        both_fly = np.minimum(there.positions_m[:, 2], here.positions_m[:, 2]) > AIRBORNE_M
+        apart_m = np.linalg.norm(there.positions_m - here.positions_m, axis=1)[both_fly]
+        if apart_m.min(initial=np.inf) < least_m:
+            yield f"vehicles {one} and {other} were {apart_m.min():.2f} m apart"
+
+
+def _too_hard(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
+    """What companions order stays within the mission's acceleration, what autopilots do by themselves within theirs."""
+    window = round(ACCELERATION_WINDOW_S / TICK_S)
+    for sysid, flown in system.flown().items():
+        if excused(scenario, sysid, FALLING + ASTRAY + PUSHED):
+            continue
+        change_m_s = flown.velocities_m_s[window:] - flown.velocities_m_s[:-window]
+        pushed_m_s2 = np.linalg.norm(change_m_s[:, :2], axis=1) / ACCELERATION_WINDOW_S
+        pushed_m_s2[flown.positions_m[window:, 2] < AIRBORNE_M] = 0.0  # the ground pushes as hard as it likes
+        by_companion = _in_offboard(system, sysid, flown.times_s[window:])
+        limits_m_s2 = ACCELERATION_SHARE * scenario.truth.limits.acceleration_m_s2, AUTOPILOTS_ACCELERATION_M_S2
+        for whose, flies, limit_m_s2 in zip(
+            ("its companion", "its autopilot"), (by_companion, ~by_companion), limits_m_s2, strict=True
+        ):
+            hardest_m_s2 = pushed_m_s2[flies].max(initial=0.0)
+            if hardest_m_s2 > limit_m_s2:
+                yield f"{whose} accelerated vehicle {sysid} by {hardest_m_s2:.1f} m/s^2"
+
+
+def _in_offboard(system: TroubledSystem, sysid: int, times_s: Array) -> BoolArray:
+    """When a companion flew, from half a second after it took over until it gave back."""
+    changes = system.modes_in_truth[sysid]
+    ends_s = [*(time_s for time_s, _ in changes[1:]), np.inf]
+    spans = [(begin_s, end_s) for (begin_s, mode), end_s in zip(changes, ends_s, strict=True) if mode is Mode.OFFBOARD]
+    inside = [(times_s > begin_s + TAKING_OVER_S) & (times_s < end_s) for begin_s, end_s in spans]
+    return np.any(inside, axis=0) if inside else np.zeros(len(times_s), bool)
+
+
+def _kept(system: TroubledSystem) -> dict[str, object]:
+    """Where something could pile up."""
+    companions = {f"companion {sysid}": companion for sysid, companion in system.companions.items()}
+    return {"station": system.station, "flight": system.flight, "simulator": system.simulator, **companions}
 
 
 def _beliefs(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:

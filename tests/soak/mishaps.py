@@ -1,5 +1,7 @@
 """What goes wrong beside the simulator's faults and companions' ends: with the ground station, sensors and restarts."""
 
+from enum import Enum
+
 import msgspec
 
 from gcs.flight.monitor import Phase
@@ -44,4 +46,33 @@ class LidarSilence(Timed, frozen=True, kw_only=True, tag="lidar-silence"):
     lasts_s: float
 
 
-Mishap = GroundCrash | GroundHang | WallClockJump | LidarSilence | CompanionRestart
+class DiskFull(Timed, frozen=True, kw_only=True, tag="disk-full"):
+    """Nothing more can be written to any file of the ground station's."""
+
+
+class OtherOrder(Enum):
+    """What somebody else's ground station orders."""
+
+    NOTHING = "nothing"
+    LAND = "land"
+    RETURN = "return"
+    HOLD_AND_GO_ON = "hold-and-go-on"
+
+
+class SecondStation(Timed, frozen=True, kw_only=True, tag="second-station"):
+    """Another ground station comes to a vehicle's link, and orders something."""
+
+    vehicle: int
+    order: OtherOrder
+
+
+class Namesake(Timed, frozen=True, kw_only=True, tag="namesake"):
+    """A second vehicle with a system id that is taken is heard for a while, from somewhere else."""
+
+    vehicle: int
+    lasts_s: float
+
+
+Mishap = (
+    GroundCrash | GroundHang | WallClockJump | LidarSilence | CompanionRestart | DiskFull | SecondStation | Namesake
+)

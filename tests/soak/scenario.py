@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from typing import TypeVar
 
 import msgspec
@@ -27,7 +28,19 @@ from missions.faults import (
 )
 from missions.mission import Blackout, LinkSettings, Mission, contradictions, load_mission
 from missions.world import Cylinder
-from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, LidarSilence, Mishap, Timed, WallClockJump
+from tests.soak.mishaps import (
+    CompanionRestart,
+    DiskFull,
+    GroundCrash,
+    GroundHang,
+    LidarSilence,
+    Mishap,
+    Namesake,
+    OtherOrder,
+    SecondStation,
+    Timed,
+    WallClockJump,
+)
 
 T = TypeVar("T")
 Rng = np.random.Generator
@@ -193,7 +206,7 @@ def _mishaps(rng: Rng, n: int, with_companions: bool) -> list[Mishap]:
     return [] if isinstance(mishap, LidarSilence) and not with_companions else [mishap]
 
 
-MISHAPS_SHARE = 0.4
+MISHAPS_SHARE = 0.5
 MISHAP_PHASES = (Phase.WAITING, Phase.PREPARED, Phase.TAKING_OFF, Phase.FLYING, Phase.FLYING, Phase.DONE)
 MISHAPS: tuple[Callable[[Rng, int, Phase, float], Timed], ...] = (
     lambda rng, n, phase, after_s: GroundCrash(phase=phase, after_s=after_s, down_s=_one_of(rng, (1.0, 5.0, 20.0))),
@@ -201,6 +214,13 @@ MISHAPS: tuple[Callable[[Rng, int, Phase, float], Timed], ...] = (
     lambda rng, n, phase, after_s: WallClockJump(phase=phase, after_s=after_s, by_s=_one_of(rng, CLOCK_JUMPS_S)),
     lambda rng, n, phase, after_s: LidarSilence(
         vehicle=_who(rng, n), phase=phase, after_s=after_s, lasts_s=_one_of(rng, (0.3, 1.0, 5.0))
+    ),
+    lambda rng, n, phase, after_s: DiskFull(phase=phase, after_s=after_s),
+    lambda rng, n, phase, after_s: SecondStation(
+        vehicle=_who(rng, n), phase=phase, after_s=after_s, order=_one_of(rng, tuple(OtherOrder))
+    ),
+    lambda rng, n, phase, after_s: Namesake(
+        vehicle=_who(rng, n), phase=phase, after_s=after_s, lasts_s=_one_of(rng, (2.0, 10.0))
     ),
 )
 CLOCK_JUMPS_S = (-3600.0, -2.0, 0.5, 2.0, 1e5)
@@ -233,6 +253,12 @@ def _named(settings: msgspec.Struct) -> str:
     """What differs from the defaults."""
     values = ((field, getattr(settings, field.name)) for field in msgspec.structs.fields(settings))
     said = ((field.name, value) for field, value in values if value != field.default)
-    words = [f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}" for name, value in said]
+    words = [f"{name}={_told(value)}" for name, value in said]
     tag = settings.__struct_config__.tag
     return " ".join([str(tag), *words] if tag is not None else words)
+
+
+def _told(value: object) -> str:
+    if isinstance(value, Enum):
+        return str(value.value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,32 +1,59 @@
 """The whole system with a ground station that crashes, hangs and is started again, and companions that come back."""
 
 import asyncio
+import resource
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from gcs.dialect import AUTOPILOT, COMPANION, Mode, mavlink
 from gcs.errors import GcsError
+from gcs.flight import actions
 from gcs.flight.events import Event, EventLog
 from gcs.flight.journal import JOURNAL_FILE, JournalKeeper
 from gcs.flight.monitor import Phase
 from gcs.flight.rejoining import rejoin, told_flight, unfinished
 from gcs.flight.report import FlightReport, make_report
 from gcs.flight.sequence import FleetFlight
+from gcs.link.codec import Codec
 from gcs.link.connection import Address, Connection
 from gcs.station import Station
 from missions.mission import Vehicle
 from missions.mission_items import plan_id
+from sitl.autopilot.modes import Mode as AutopilotMode
+from sitl.autopilot.plan import Plan
+from sitl.microservices.outbox import Link
 from sitl.simulator import UTC_START_US
 from tests.simulation.whole_system import MOST_WAITING, GroundWire, LidarWire, WholeSystem
-from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, LidarSilence, Mishap, Timed, WallClockJump
+from tests.soak.mishaps import (
+    CompanionRestart,
+    DiskFull,
+    GroundCrash,
+    GroundHang,
+    LidarSilence,
+    Mishap,
+    Namesake,
+    OtherOrder,
+    SecondStation,
+    Timed,
+    WallClockJump,
+)
 
 LOOK_INTERVAL_S = 0.1
 OPERATOR_S = 10.0
 """Whoever sits at the page of a restarted ground station lands what has not flown its mission for so long."""
 LONGEST_S = 900.0
 """No flight is watched for longer after a restart; endurance is over by then."""
+LONGEST_FLIGHT_S = 3600.0
+"""Whatever goes wrong, a flight ends within an hour; minutes of that may be an upload over a bad link."""
+HELD_WITHIN_S = 2.5
+"""After the end of its companion a vehicle holds within this."""
+SECOND_STATION = 254
+VISIT_S, GOING_ON_AFTER_S = 12.0, 6.0
+"""So long the second ground station stays; who was held by it is let go on after this."""
+ELSEWHERE = ("elsewhere", 9)
 PHASES = list(Phase)
 
 
@@ -90,7 +117,7 @@ class HaltedWire(GroundWire):
     def send(self, datagram: bytes, address: Address) -> None:
         if self._process.halted:
             self._process.waiting_out.append((datagram, address))
-        elif not self._process.ended:
+        elif not self._process.ended and address != ELSEWHERE:
             super().send(datagram, address)
 
 
@@ -107,6 +134,10 @@ class TroubledSystem(WholeSystem):
     """(simulated time, what) of everything that came back."""
     false_beliefs: list[str] = field(default_factory=list)
     """What the ground station said to be stored, and was not at that moment."""
+    mistakes: list[str] = field(default_factory=list)
+    """What should not have happened on the way."""
+    modes_in_truth: dict[int, list[tuple[float, AutopilotMode]]] = field(default_factory=dict)
+    """(simulated time, mode) of every change of each autopilot's mode."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -124,20 +155,27 @@ class TroubledSystem(WholeSystem):
 
     # ---------------------------------------------------------------- the flight
     async def _fly(self) -> FlightReport:
+        unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
         with TemporaryDirectory() as folder:
             self._folder = Path(folder)
-            return await self._fly_with_mishaps()
+            try:
+                return await self._fly_with_mishaps()
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
 
     async def _fly_with_mishaps(self) -> FlightReport:
         async with asyncio.TaskGroup() as group:
             self._group = group
-            background = [group.create_task(self.simulate())]
+            background = [group.create_task(self.simulate()), group.create_task(self._watch_autopilots())]
             background += [group.create_task(self._befall(m)) for m in self.mishaps if isinstance(m, Timed)]
             if self.mode.needs_companions:
                 background += [group.create_task(self._companion(vehicle)) for vehicle in self.mission.vehicles]
             self._ended = asyncio.Event()
             self._start_ground()
-            await self._ended.wait()
+            try:
+                await asyncio.wait_for(self._ended.wait(), LONGEST_FLIGHT_S)
+            except TimeoutError:
+                self.mistakes.append(f"the flight has not ended after {LONGEST_FLIGHT_S:g} s")
             for task in (*background, *self._ground):
                 task.cancel()
         reason = str(self.error) if self.error else ""
@@ -204,6 +242,7 @@ class TroubledSystem(WholeSystem):
             await asyncio.sleep(back[0].down_s)
             self.faults = tuple(fault for fault in self.faults if fault.vehicle != vehicle.sysid)
             self.restarts.append((self.simulator.time_s, f"companion {vehicle.sysid}"))
+            del self.deaths[vehicle.sysid]
             await super()._companion(vehicle)
 
     def _check_belief(self, event: Event) -> None:
@@ -214,6 +253,30 @@ class TroubledSystem(WholeSystem):
         stored = plan_id(self.simulator.vehicles[sysid].autopilot.navigator.mission.plan.items)
         if stored != event.data["plan_id"]:
             self.false_beliefs.append(f"{event.vehicle} {event.kind} {event.data['plan_id']:08x}, has {stored:08x}")
+
+    async def _watch_autopilots(self) -> None:
+        """Note each autopilot's modes; nobody stays in Offboard without a companion, and no mission begins anew."""
+        flown: dict[int, tuple[Plan, int]] = {}
+        while True:
+            now_s = self.simulator.time_s
+            for sysid, vehicle in self.simulator.vehicles.items():
+                commander, mission = vehicle.autopilot.commander, vehicle.autopilot.navigator.mission
+                noted = self.modes_in_truth.setdefault(sysid, [])
+                if not noted or noted[-1][1] is not commander.mode:
+                    noted.append((now_s, commander.mode))
+                flies = commander.mode if commander.armed else None
+                died_s = self.deaths.get(sysid, now_s)
+                if flies is AutopilotMode.OFFBOARD and now_s - died_s > HELD_WITHIN_S:
+                    self.mistakes.append(f"vehicle {sysid} is in Offboard, and its companion ended at {died_s:.1f} s")
+                    del self.deaths[sysid]
+                if flies is not AutopilotMode.MISSION:
+                    flown.pop(sysid, None)
+                    continue
+                plan, seq = flown.get(sysid, (None, 0))
+                if plan is mission.plan and mission.current < seq:
+                    self.mistakes.append(f"vehicle {sysid} turned back from item {seq} to {mission.current}")
+                flown[sysid] = mission.plan, mission.current
+            await asyncio.sleep(LOOK_INTERVAL_S)
 
     # ------------------------------------------------------------------- mishaps
     async def _befall(self, mishap: Timed) -> None:
@@ -234,6 +297,12 @@ class TroubledSystem(WholeSystem):
                 lidar.dead = True
                 await asyncio.sleep(mishap.lasts_s)
                 lidar.dead = False
+            case DiskFull():
+                self._fill_disk()
+            case SecondStation():
+                await self._visit(mishap.vehicle, mishap.order)
+            case Namesake():
+                await self._resound(mishap.vehicle, mishap.lasts_s)
 
     def _has_come_to(self, phase: Phase) -> bool:
         if phase is Phase.WAITING:
@@ -254,3 +323,36 @@ class TroubledSystem(WholeSystem):
         self.process.ended = False
         self.restarts.append((self.simulator.time_s, "ground station"))
         self._start_ground()
+
+    @staticmethod
+    def _fill_disk() -> None:
+        """No file of this process may grow any more: writing fails as on a full disk, with another number."""
+        _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, hard))
+
+    async def _visit(self, sysid: int, order: OtherOrder) -> None:
+        """A second ground station on a vehicle's link: its heartbeats, and its orders, a second after another."""
+        codec, peer = Codec(SECOND_STATION), (sysid, AUTOPILOT)
+        starter = (sysid, COMPANION) if self.mode.needs_companions else peer
+        hold, go_on = actions.set_mode(Mode.HOLD).message(peer, 0), actions.start_mission().message(starter, 0)
+        orders = {
+            OtherOrder.NOTHING: {},
+            OtherOrder.LAND: {1.0: actions.set_mode(Mode.LAND).message(peer, 0)},
+            OtherOrder.RETURN: {1.0: actions.set_mode(Mode.RTL).message(peer, 0)},
+            OtherOrder.HOLD_AND_GO_ON: {1.0: hold, 1.0 + GOING_ON_AFTER_S: go_on},
+        }[order]
+        heartbeat = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+        for second in range(round(VISIT_S)):
+            for message in (heartbeat, *(order for at_s, order in orders.items() if at_s <= second < at_s + 4.0)):
+                self.simulator.receive(sysid, Link.GROUND, codec.pack(message))
+            await asyncio.sleep(1.0)
+
+    async def _resound(self, sysid: int, lasts_s: float) -> None:
+        """A second vehicle with this system id, which stands about somewhere else."""
+        codec = Codec(sysid, AUTOPILOT)
+        heartbeat = mavlink.MAVLink_heartbeat_message(
+            mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 0, int(Mode.HOLD), mavlink.MAV_STATE_STANDBY, 3
+        )
+        for _ in range(round(lasts_s)):
+            self.station.receive(self.wire, codec.pack(heartbeat), ELSEWHERE)
+            await asyncio.sleep(1.0)
