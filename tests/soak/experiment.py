@@ -14,9 +14,6 @@ from tests.soak.invariants import violations
 from tests.soak.scenario import Scenario, draw
 from tests.soak.troubled_system import TroubledSystem
 
-OBJECTS_BETWEEN_COLLECTIONS = 100_000
-"""A flight makes many objects and few cycles: Python looks for these so often that it takes a twentieth of the time."""
-
 
 def fly(scenario: Scenario, seed: int) -> tuple[TroubledSystem, FlightReport, Row]:
     """One flight, its report, and its row."""
@@ -60,7 +57,7 @@ def runs(seeds: Sequence[int]) -> list[Run]:
 
 def work(run: Run) -> Row:
     """Fly one seed; a defect that raises is a violation, too."""
-    gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS)
+    _collect_between_flights()
     seed = run.number("seed")
     scenario = draw(seed)
     try:
@@ -69,6 +66,18 @@ def work(run: Run) -> Row:
         raised = f"raised {_innermost(defect)}"
         nothing: Row = {"success": False, "reason": "", "simulated_s": 0.0, "fingerprint": ""}
         return {"story": scenario.story, "violations": raised, **nothing}
+
+
+def _collect_between_flights() -> None:
+    """Free what the flight before has left, and nothing during a flight, which makes few cycles and many objects.
+
+    What outlives flights is made in the first one, and not looked through again.
+    """
+    gc.collect()
+    if gc.isenabled():
+        gc.disable()
+    elif not gc.get_freeze_count():
+        gc.freeze()
 
 
 def _innermost(defect: BaseException) -> str:

@@ -142,6 +142,8 @@ class TroubledSystem(WholeSystem):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._clock_ahead_us = 0
+        self._alive_again: set[int] = set()
+        """Vehicles whose companion has been started again."""
         self._begin_process()
         self.lidars = {vehicle.sysid: FailingLidar() for vehicle in self.mission.vehicles}
 
@@ -242,7 +244,7 @@ class TroubledSystem(WholeSystem):
             await asyncio.sleep(back[0].down_s)
             self.faults = tuple(fault for fault in self.faults if fault.vehicle != vehicle.sysid)
             self.restarts.append((self.simulator.time_s, f"companion {vehicle.sysid}"))
-            del self.deaths[vehicle.sysid]
+            self._alive_again.add(vehicle.sysid)
             await super()._companion(vehicle)
 
     def _check_belief(self, event: Event) -> None:
@@ -265,10 +267,10 @@ class TroubledSystem(WholeSystem):
                 if not noted or noted[-1][1] is not commander.mode:
                     noted.append((now_s, commander.mode))
                 flies = commander.mode if commander.armed else None
-                died_s = self.deaths.get(sysid, now_s)
+                died_s = now_s if sysid in self._alive_again else self.deaths.get(sysid, now_s)
                 if flies is AutopilotMode.OFFBOARD and now_s - died_s > HELD_WITHIN_S:
                     self.mistakes.append(f"vehicle {sysid} is in Offboard, and its companion ended at {died_s:.1f} s")
-                    del self.deaths[sysid]
+                    self._alive_again.add(sysid)  # said once
                 if flies is not AutopilotMode.MISSION:
                     flown.pop(sysid, None)
                     continue
