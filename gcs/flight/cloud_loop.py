@@ -151,6 +151,7 @@ class CloudLoop:
             self._unconfirmed.setdefault(part.sysid, {})[plan_id(items)] = new
             return False
         self._take(vehicle, new)
+        self._unconfirmed.pop(part.sysid, None)
         took_s = self._now_s - began_s
         self.swaps_s.append(took_s)
         flight.events.add("swapped", f"flies the new plan after {took_s:.2f} s", vehicle.name, plan_id=plan_id(items))
@@ -164,15 +165,19 @@ class CloudLoop:
         assert flight.plan is not None
         parts = tuple(new.part if old.sysid == vehicle.sysid else old for old in flight.plan.vehicles)
         flight.plan = replace(flight.plan, vehicles=parts)
-        self._unconfirmed.pop(vehicle.sysid, None)
 
     def _reconcile(self) -> None:
-        """Companions that fly a plan whose arrival they could not confirm in time: it is theirs, and not sent again."""
-        for sysid, plans in tuple(self._unconfirmed.items()):
+        """Companions that fly a plan whose arrival they could not confirm in time: it is theirs, and not sent again.
+
+        What was sent after that plan may be flown yet; what was sent before it is over.
+        """
+        for sysid, plans in self._unconfirmed.items():
             status = self.flight.state(sysid).companion.status
             if status is not None and status.plan_id in plans:
-                vehicle = self.flight.vehicles[sysid]
+                vehicle, sent = self.flight.vehicles[sysid], list(plans)
                 self._take(vehicle, plans[status.plan_id])
+                for over in sent[: sent.index(status.plan_id) + 1]:
+                    del plans[over]
                 text = "flies a plan that it could not confirm in time"
                 self.flight.events.add("reconciled", text, vehicle.name, plan_id=status.plan_id)
 
