@@ -141,6 +141,13 @@ class SystemPaths(Generic[PathKey]):
             if key != self.chosen and now_s - path.heard_s <= LIVE_S and _differ(mine, path)
         ]
 
+    def is_stranger(self, key: PathKey, now_s: float) -> bool:
+        """Who comes this way has not told its clock, and the vehicle that has is heard elsewhere: is it the same?"""
+        mine = self.paths.get(self.chosen) if self.chosen is not None else None
+        if mine is None or key == self.chosen or now_s - mine.heard_s > LIVE_S:
+            return False
+        return mine.boot_clock_s is not None and self.paths[key].boot_clock_s is None
+
 
 def _differ(one: Path, other: Path) -> bool:
     if one.hardware_id and other.hardware_id and one.hardware_id != other.hardware_id:

@@ -59,6 +59,9 @@ class Routes:
                     "give one of them another system id",
                 )
                 return False
+            if component == AUTOPILOT and system.is_stranger(way, now_s):
+                self.ignored += 1
+                return False
         if kind == "HEARTBEAT" and message.type == mavlink.MAV_TYPE_GCS:
             what = f"another ground station, {sysid}/{component}, is on the link ({_at(way)})"
             self._name_once(("gcs", sysid, component), what)

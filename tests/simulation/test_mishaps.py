@@ -1,16 +1,30 @@
 """Flights whose ground station crashes or hangs, and whose companions come back, in process."""
 
+import resource
+
 import pytest
 
 from gcs.dialect import Mode
+from gcs.flight import actions
 from gcs.flight.monitor import Phase
 from gcs.flight.report import Flown
 from gcs.settings import PlanningMode
 from missions.faults import CompanionKill, Fault, LinkFault, SimulatedLink
 from missions.mission import load_mission
+from tests.soak import troubled_system
 from tests.soak.experiment import fly, runs, work
 from tests.soak.invariants import violations
-from tests.soak.mishaps import CompanionRestart, GroundCrash, GroundHang, Mishap, WallClockJump
+from tests.soak.mishaps import (
+    CompanionRestart,
+    DiskFull,
+    GroundCrash,
+    GroundHang,
+    Mishap,
+    Namesake,
+    OtherOrder,
+    SecondStation,
+    WallClockJump,
+)
 from tests.soak.scenario import Scenario, draw
 from tests.soak.troubled_system import TroubledSystem
 
@@ -105,6 +119,43 @@ def test_a_companion_that_comes_back_does_not_take_over_by_itself():
     landed_s = float(flown_by(system, 1).times_s[flown_by(system, 1).positions_m[:, 2] > 0.3][-1])
     assert [mode for at_s, mode in system.modes[1] if held_s < at_s < landed_s] == [Mode.LAND]
     assert system.flight.vehicles[2].monitor.reached
+
+
+def test_on_a_full_disk_a_flight_goes_on_and_it_is_said_once():
+    system = flown(DiskFull(phase=Phase.FLYING, after_s=1.0))
+    assert system.flight.success, system.error
+    (said,) = system.unwritten
+    assert "the journal" in said
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 0
+
+
+def test_what_a_second_ground_station_orders_is_followed():
+    system = flown(SecondStation(vehicle=1, phase=Phase.FLYING, after_s=1.0, order=OtherOrder.LAND))
+    one, other = system.flight.vehicles[1].monitor, system.flight.vehicles[2].monitor
+    assert (one.reached, one.phase, other.reached) == (False, Phase.DONE, True)
+    assert one.reason
+    assert flown_by(system, 1).positions_m[-1, 2] < 0.2
+
+
+def test_who_is_held_by_a_second_ground_station_and_let_go_on_flies_to_its_target(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(troubled_system, "GOING_ON_AFTER_S", 3.0)  # later, the first station lands it
+    visit = SecondStation(vehicle=1, phase=Phase.FLYING, after_s=3.0, order=OtherOrder.HOLD_AND_GO_ON)
+    system = flown(visit)
+    assert not system.mistakes
+    assert flown_by(system, 1).positions_m[-1] == pytest.approx([19.0, 8.5, 0.0], abs=0.5)
+    monkeypatch.setattr(actions, "CURRENT_ITEM", 0.0)
+    assert "turned back" in flown(visit).mistakes[0]
+
+
+def test_a_namesake_that_is_heard_in_flight_changes_nothing():
+    system = flown(Namesake(vehicle=1, phase=Phase.FLYING, after_s=1.0, lasts_s=5.0))
+    assert system.flight.success, system.error
+    assert system.station.routes.ignored >= 5
+
+
+def test_a_flight_that_does_not_end_is_a_mistake(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(troubled_system, "LONGEST_FLIGHT_S", 5.0)
+    assert flown().mistakes == ["the flight has not ended after 5 s"]
 
 
 def test_a_vehicle_that_still_moves_at_the_end_is_a_violation():

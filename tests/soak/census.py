@@ -28,7 +28,7 @@ def crowds(roots: Mapping[str, object], most: int) -> Iterator[tuple[str, int]]:
             if len(kept) > most and getattr(thing, "maxlen", None) is None:
                 yield path, len(kept)
             waiting.extend((f"{path}[]", part) for part in islice(kept, LOOKED_INTO))
-        elif type(thing).__module__.split(".")[0] in PROGRAMS:
+        elif any(kind.__module__.split(".")[0] in PROGRAMS for kind in type(thing).__mro__):
             waiting.extend((f"{path}.{name}", part) for name, part in _attributes(thing))
 
 

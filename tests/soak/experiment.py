@@ -3,7 +3,8 @@
 import gc
 import hashlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from gcs.experiments.experiment import Experiment, Row, Run, product
@@ -57,27 +58,30 @@ def runs(seeds: Sequence[int]) -> list[Run]:
 
 def work(run: Run) -> Row:
     """Fly one seed; a defect that raises is a violation, too."""
-    _collect_between_flights()
     seed = run.number("seed")
     scenario = draw(seed)
     try:
-        return fly(scenario, seed)[-1]
+        with _collected_before():
+            return fly(scenario, seed)[-1]
     except Exception as defect:
         raised = f"raised {_innermost(defect)}"
         nothing: Row = {"success": False, "reason": "", "simulated_s": 0.0, "fingerprint": ""}
         return {"story": scenario.story, "violations": raised, **nothing}
 
 
-def _collect_between_flights() -> None:
-    """Free what the flight before has left, and nothing during a flight, which makes few cycles and many objects.
-
-    What outlives flights is made in the first one, and not looked through again.
-    """
+@contextmanager
+def _collected_before() -> Iterator[None]:
+    """Free what the flight before has left, and look for nothing during this one: it makes few cycles, many objects."""
     gc.collect()
-    if gc.isenabled():
-        gc.disable()
-    elif not gc.get_freeze_count():
+    if not gc.get_freeze_count():
         gc.freeze()
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def _innermost(defect: BaseException) -> str:

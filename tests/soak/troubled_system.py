@@ -134,6 +134,8 @@ class TroubledSystem(WholeSystem):
     """(simulated time, what) of everything that came back."""
     false_beliefs: list[str] = field(default_factory=list)
     """What the ground station said to be stored, and was not at that moment."""
+    unwritten: list[str] = field(default_factory=list)
+    """What the ground station says of files that it cannot write."""
     mistakes: list[str] = field(default_factory=list)
     """What should not have happened on the way."""
     modes_in_truth: dict[int, list[tuple[float, AutopilotMode]]] = field(default_factory=dict)
@@ -187,7 +189,7 @@ class TroubledSystem(WholeSystem):
     def _start_ground(self) -> None:
         """A process of the ground station begins: back into the flight that its journal tells of, or with a new one."""
         story, mission = unfinished(self._folder, self.mission), self.mission
-        self._journal = JournalKeeper(self._folder / JOURNAL_FILE)
+        self._journal = JournalKeeper(self._folder / JOURNAL_FILE, self.unwritten.append)
         if not hasattr(self, "events"):
             self.events = EventLog(asyncio.get_running_loop().time, listeners=[self._check_belief])
         if story is not None:

@@ -1,5 +1,8 @@
 """The soak's own promises: seeds are drawn and flown the same way each time, and violations are found."""
 
+from collections import deque
+from dataclasses import replace
+
 import pytest
 
 from gcs.experiments.experiment import Run
@@ -7,6 +10,7 @@ from gcs.flight.monitor import Phase
 from gcs.settings import PlanningMode
 from missions.faults import MotorFailure
 from tests.soak import experiment
+from tests.soak.census import crowds
 from tests.soak.invariants import excused, violations
 from tests.soak.scenario import Scenario, draw
 
@@ -20,7 +24,7 @@ def test_a_seed_is_one_scenario_and_seeds_differ():
 def test_all_kinds_of_faults_and_modes_are_drawn():
     text = " ".join(draw(seed).story for seed in range(300))
     kinds = ["companion-kill", "companion-hang", "gps-loss", "motor-failure", "battery", "reboot", "weather"]
-    for word in [*kinds, "sensor-noise", "link", "pillar", "blackouts", "end-cloud", "cloud", "onboard"]:
+    for word in [*kinds, "sensor-noise", "link", "pillar", "disk-full", "second-station", "namesake", "onboard"]:
         assert word in text, word
 
 
@@ -50,6 +54,23 @@ def test_what_must_not_happen_is_found(flown):
     found = " ".join(violations(scenario, system, report))
     for words in ("outside of its flight range", "m/s", "has arrived, says the ground station", "is flying at the end"):
         assert words in found
+
+
+def test_what_companions_must_not_do_is_found(flown):
+    scenario, system, report, _, _ = flown
+    with_companions = replace(scenario, mode=PlanningMode.END_CLOUD)
+    system.truth = [(t_s, at_m[[0, 0]] + [0.0, 0.0, 1.0], v_m_s * 3.0) for t_s, at_m, v_m_s in system.truth]
+    found = " ".join(violations(with_companions, system, report))
+    for words in ("vehicles 1 and 2 were 0.00 m apart", "its autopilot accelerated vehicle 1 by"):
+        assert words in found
+
+
+def test_what_piles_up_is_found_wherever_it_is(flown):
+    _, system, *_ = flown
+    assert not list(crowds({"station": system.station}, most=500))
+    fleet = system.station.fleet
+    fleet.queue, fleet.heap = deque(range(501), maxlen=501), list(range(501))
+    assert list(crowds({"station": system.station}, most=500)) == [("station.fleet.heap", 501)]
 
 
 def test_who_falls_by_a_fault_is_excused_and_nobody_else():
