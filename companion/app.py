@@ -126,14 +126,15 @@ class App:
             event = await self.autopilot.receive()
             if isinstance(event, events.Odometry):
                 self._clock.observe(event.time_s, loop.time())
+            now_s = self._now_s
             if self.sensing is not None:
-                notice(self.sensing, event, self._now_s)
+                notice(self.sensing, event, now_s)
             if self.fleet is not None:
                 self.fleet.notice(event)
             if isinstance(event, events.ReceiptHeard):
-                self.budget.take(event.sender, event.receipt, self._now_s)
+                self.budget.take(event.sender, event.receipt, now_s)
             elif not isinstance(event, events.RingReported):
-                self._handle(event)
+                self._handle(event, now_s)
 
     async def _tick(self) -> None:
         loop = asyncio.get_running_loop()
@@ -144,7 +145,7 @@ class App:
             late_s, age_s, now_s = loop.time() - due_s, self._clock.age_s(loop.time()), self._now_s
             if self.fleet is not None:
                 self.fleet.listen(now_s)
-            self._handle(events.Tick(age_s, lateness_ms=late_s * 1e3, sensor_silent=self._look(now_s)))
+            self._handle(events.Tick(age_s, lateness_ms=late_s * 1e3, sensor_silent=self._look(now_s)), now_s)
             if self.fleet is not None:
                 self.fleet.speak(self.pilot.briefing.frame, now_s)
             if self.pilot.in_control:
@@ -184,7 +185,7 @@ class App:
 
     async def _wait_for_stop(self) -> None:
         await self._stop.wait()
-        self._handle(events.StopRequested())
+        self._handle(events.StopRequested(), self._now_s)
         await asyncio.sleep(LONGEST_BRAKING_S / self.settings.speed + HOLD_TIMEOUT_S)
         self.journal.tell("Hold was not confirmed in time")
         self._ended.set()
@@ -194,8 +195,8 @@ class App:
         """Vehicle time [s]."""
         return self._clock.now_s(asyncio.get_running_loop().time())
 
-    def _handle(self, event: Event) -> None:
-        for instruction in self.pilot.handle(event, self._now_s):
+    def _handle(self, event: Event, now_s: float) -> None:
+        for instruction in self.pilot.handle(event, now_s):
             self._carry_out(instruction)
         if (state := self.pilot.state) is not self._state:
             self._state, reason = state, self.pilot.reason
@@ -248,11 +249,11 @@ class App:
         except CommandRefused as refused:
             accepted = False
             self.journal.tell(str(refused))
-        self._handle(events.ModeCommandEnded(mode, accepted))
+        self._handle(events.ModeCommandEnded(mode, accepted), self._now_s)
 
     async def _plan(self, request: PlanRequest) -> None:
         plan, cpu_s = await self.work(lambda: self._timed_plan(request))
-        self._handle(events.PlanReady(plan, cpu_s * 1e3))
+        self._handle(events.PlanReady(plan, cpu_s * 1e3), self._now_s)
 
     def _timed_plan(self, request: PlanRequest) -> tuple[Plan, float]:
         began_s = self.cpu_clock()
@@ -265,7 +266,7 @@ class App:
             items = await self.autopilot.download_mission()
         except CommandRefused as refused:
             self.journal.tell(str(refused))
-        self._handle(events.MissionDownloaded(identity, items))
+        self._handle(events.MissionDownloaded(identity, items), self._now_s)
 
     async def _set_current_item(self, seq: int) -> None:
         try:

@@ -149,13 +149,19 @@ class Simulator:
         return self._ticks * TICK_S
 
     @property
+    def motion(self) -> tuple[Array, Array]:
+        """(n, 3) positions [m] and (n, 3) velocities [m/s] of the vehicles, ENU, as they really are now."""
+        return self._fleet.positions_enu_m, self._fleet.velocities_enu_m_s
+
+    @property
     def truth(self) -> Truth:
         """Where the vehicles really are now."""
+        position_enu_m, velocity_enu_m_s = self.motion
         return Truth(
             time_s=self.time_s,
             sysids=tuple(self.vehicles),
-            position_enu_m=self._fleet.positions_enu_m,
-            velocity_enu_m_s=self._fleet.velocities_enu_m_s,
+            position_enu_m=position_enu_m,
+            velocity_enu_m_s=velocity_enu_m_s,
             attitude_ned_frd=self._fleet.vehicles["attitude"].copy(),
             crashed=self._fleet.vehicles["crash"] != Crash.NONE,
         )

@@ -1,6 +1,7 @@
 """An event loop whose clock jumps to the next timer: coroutines that wait for hours run in no time, in one order."""
 
 import asyncio
+import selectors
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
@@ -11,11 +12,18 @@ class NothingLeftToWaitFor(RuntimeError):
     """All coroutines wait for something that can no longer happen."""
 
 
+class NobodyOutside(selectors.SelectSelector):
+    """Nothing comes from outside of the process: the kernel need not be asked at every turn."""
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        return []
+
+
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
     """As asyncio's own loop, but time passes only when nothing is left to do now."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(NobodyOutside())
         self._now_s = 0.0
 
     def time(self) -> float:

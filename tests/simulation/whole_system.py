@@ -243,8 +243,7 @@ class WholeSystem:
         """Advance the simulator and carry its messages, until cancelled."""
         while True:
             self.simulator.step()
-            truth = self.simulator.truth
-            self.truth.append((truth.time_s, truth.position_enu_m, truth.velocity_enu_m_s))
+            self.truth.append((self.simulator.time_s, *self.simulator.motion))
             for sysid, link, frame in self.simulator.transmissions():
                 if link is Link.GROUND:
                     self.wire.bytes += len(frame)
