@@ -101,11 +101,8 @@ class LocalMap:
         Ask it in the thread that observes.
         """
         grid = self._grid
-        blocks = np.argwhere(grid.counts > 0)  # most blocks are empty: these alone are looked through
-        x, y, z = grid.counts.shape
-        by_block = grid.strength.reshape(x, BLOCK, y, BLOCK, z, BLOCK).transpose(0, 2, 4, 1, 3, 5)
-        which, *inside = np.nonzero(by_block[tuple(blocks.T)] >= CERTAIN)
-        voxels = BLOCK * blocks[which] + np.column_stack(inside)
+        flat = np.flatnonzero(grid.strength.ravel() >= CERTAIN)  # many times faster than an argwhere of three axes
+        voxels = np.column_stack(np.unravel_index(flat, grid.strength.shape))
         centres_m = grid.low_m + (voxels + 0.5) * grid.voxel_m
         return centres_m, grid.low_m, grid.low_m + self._size * grid.voxel_m
 
