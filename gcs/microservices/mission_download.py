@@ -113,7 +113,6 @@ class MissionDownload(Microservice):
                 return []
 
     def handle_timeout(self, now_s: float) -> list[Message]:
-        self._round_trip.miss()
         if now_s - self._heard_s > PATIENCE_S:
             self.done = True
             raise MissionTransferError(f"{self}: no answer after {len(self._found)} items")

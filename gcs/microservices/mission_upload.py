@@ -116,7 +116,6 @@ class MissionUpload(Microservice):
         return self._requested(message.seq, now_s)
 
     def handle_timeout(self, now_s: float) -> list[Message]:
-        self._round_trip.miss()
         if now_s - self._heard_s > PATIENCE_S:
             self.done = True
             raise MissionTransferError(f"{self}: no answer after {self.taken} of {len(self.items)} items")

@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 
 UNKNOWN_TIMEOUT_S = 0.5
-"""Patience before the first answer ..."""
-GROWTH = 1.5
-"""... and its growth with each one that was missed."""
+"""Patience before the first answer."""
 LEAST_WEIGHT = 1 / 20
 """Of one observation of loss; the first ones weigh more."""
 MOST_LOSS = 0.95
@@ -20,13 +18,6 @@ class RoundTrip:
 
     smoothed_s: float | None = None
     variation_s: float = 0.0
-    missed: int = 0
-    """Answers that were late while nothing had been measured."""
-
-    def miss(self) -> None:
-        """An answer is late: while nothing is known, it may be the link that is slow."""
-        if self.smoothed_s is None:
-            self.missed += 1
 
     def sample(self, round_trip_s: float) -> None:
         """Take in one measured round trip of something that was sent once (Karn's rule)."""
@@ -40,7 +31,7 @@ class RoundTrip:
     def timeout_s(self) -> float:
         """When an answer is late."""
         if self.smoothed_s is None:
-            return min(UNKNOWN_TIMEOUT_S * GROWTH**self.missed, LONGEST_TIMEOUT_S)
+            return UNKNOWN_TIMEOUT_S
         late_s = self.smoothed_s + max(4 * self.variation_s, LEAST_MARGIN_S)
         return min(max(late_s, SHORTEST_TIMEOUT_S), LONGEST_TIMEOUT_S)
 
