@@ -1,7 +1,7 @@
 """What holds in every flight, whatever goes wrong; each violation is a sentence."""
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,10 @@ ARRIVAL_SLACK_M = 0.3
 AIRBORNE_M = 0.3
 SEPARATION_SHARE = 0.8
 """Of the mission's separation: plans keep it, tracking errors come on top."""
+UNANNOUNCED_S = 0.6, 3.0
+"""Before and after a vehicle in motion leaves Offboard. Its setpoints may have ended half a second ago; the others rely
+on its last announced plan for 1.5 s, and need the rest for braking. Collisions count at all times."""
+IN_MOTION_M_S = 0.3
 ACCELERATION_WINDOW_S = 0.2
 ACCELERATION_SHARE = 1.5
 """Of the mission's limit, which is what is planned with: in brakings the autopilot's own corrections come on top."""
@@ -99,10 +103,23 @@ def _too_near(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
     for (one, there), (other, here) in combinations(system.flown().items(), 2):
         if any(excused(scenario, sysid, FALLING + ASTRAY + PUSHED) for sysid in (one, other)):
             continue
-        both_fly = np.minimum(there.positions_m[:, 2], here.positions_m[:, 2]) > AIRBORNE_M
-        apart_m = np.linalg.norm(there.positions_m - here.positions_m, axis=1)[both_fly]
+        judged = np.minimum(there.positions_m[:, 2], here.positions_m[:, 2]) > AIRBORNE_M
+        judged &= ~(_breaks_its_word(system, one) | _breaks_its_word(system, other))
+        apart_m = np.linalg.norm(there.positions_m - here.positions_m, axis=1)[judged]
         if apart_m.min(initial=np.inf) < least_m:
             yield f"vehicles {one} and {other} were {apart_m.min():.2f} m apart"
+
+
+def _breaks_its_word(system: TroubledSystem, sysid: int) -> BoolArray:
+    """When a vehicle does not fly any more what its companion announced, and the others cannot have noticed."""
+    flown = system.flown()[sysid]
+    before_s, after_s = UNANNOUNCED_S
+    broken = np.zeros(len(flown.times_s), bool)
+    for (_, mode), (left_s, _) in pairwise(system.modes_in_truth[sysid]):
+        velocity_m_s = flown.velocities_m_s[min(np.searchsorted(flown.times_s, left_s), len(broken) - 1)]
+        if mode is Mode.OFFBOARD and np.linalg.norm(velocity_m_s) > IN_MOTION_M_S:
+            broken |= (flown.times_s > left_s - before_s) & (flown.times_s < left_s + after_s)
+    return broken
 
 
 def _too_hard(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
