@@ -8,7 +8,7 @@ TEST := $(BIN)/python -m pytest
 SPEED ?= 1
 SEEDS ?= 0:30
 
-.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link bench-load experiment-modes soak fuzz bench-view screenshots check docs dist check-dist format check-px4 clean
+.PHONY: help install demo test test-all bench-sitl bench-planner bench-onboard bench-link bench-load experiment-modes experiment-missions soak fuzz bench-view screenshots check docs dist check-dist format check-px4 clean
 
 help:  ## this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-12s %s\n", $$1, $$2}'
@@ -63,6 +63,9 @@ bench-planner: $(VENV)/.installed-bench  ## the cloud planner beside its peers, 
 
 experiment-modes: $(VENV)/.installed-dev  ## end and cloud together against either alone, flown in process: make experiment-modes SEEDS=0:10 [OUTPUT=docs/results]
 	$(BIN)/python -m tests.experiments.modes --seeds $(SEEDS) $(if $(OUTPUT),--output $(OUTPUT))
+
+experiment-missions: $(VENV)/.installed-dev  ## every shipped mission flown in full, in process: make experiment-missions SEEDS=0:1 [OUTPUT=docs/results]
+	$(BIN)/python -m tests.experiments.missions --seeds $(SEEDS) $(if $(OUTPUT),--output $(OUTPUT))
 
 bench-onboard: $(VENV)/.installed-dev  ## the onboard planner, alone (50 seeds are asked for) and in fleets: make bench-onboard SEEDS=0:10 [BENCH=--quick]
 	@alone=0; $(BIN)/python -m tests.benchmarks.onboard --seeds $(SEEDS) $(BENCH) || alone=1; \

@@ -207,8 +207,7 @@ class FlightApp:
         """The flight, and with a page whatever the operator does until the session is ended."""
         try:
             if self._restored:
-                await rejoin(self.flight, self.events)
-                await self.desk.follow()
+                await rejoin(self.flight, self.events, self.desk.follow)
             else:
                 self._journal.begin(self.flight, self.station.unix_us())
             if self._page is not None:

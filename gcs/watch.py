@@ -66,8 +66,7 @@ async def watch(
 async def _find(desk: Desk, flight: FleetFlight) -> None:
     """Find into a flight, and follow it to its end."""
     try:
-        await rejoin(flight, desk.events)
-        await desk.follow()
+        await rejoin(flight, desk.events, desk.follow)
     except GcsError as problem:
         desk.events.add("failed", str(problem), severity=Severity.ERROR)
 

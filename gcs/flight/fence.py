@@ -47,6 +47,13 @@ def fence_height_m(mission: Mission) -> float:
     return math.ceil(mission.world.bounds.up_m[1] - lowest_pad_m + mission.site.fence_margin_m)
 
 
+def return_height_m(mission: Mission) -> float:
+    """RTL_RETURN_ALT: how far above its home a vehicle may climb for its way back, within its flight range [m]."""
+    highest_pad_m = max(vehicle.pad_m[2] for vehicle in mission.vehicles)
+    room_m = mission.world.bounds.up_m[1] - highest_pad_m - mission.limits.clearance_m
+    return max(room_m, mission.takeoff_height_m)
+
+
 def _enters(line: shapely.LineString, threat: Threat) -> bool:
     return line.distance(shapely.Point(threat.centre_m)) < threat.radius_m
 

@@ -28,6 +28,12 @@ HOLD_AGAIN_S = 1.5
 NEWS_S = 2.0
 """A vehicle that is heard again has said within this whether it has landed [s, wall clock]."""
 
+ORDER_AGAIN_S = 2.0
+"""After an order of the ground's own was refused or not answered, it is given again as soon as this [s, wall clock]."""
+
+LOST_S = 300.0
+"""Who is not heard for longer than it may fly by so much has come down somewhere [s, vehicle time]."""
+
 UNATTENDED_HOLD_S = 5.0
 """With nobody at the page, an interrupted vehicle holds for so long and is then landed [s]."""
 
@@ -92,6 +98,8 @@ class VehicleMonitor:
     _started_wall_s: float = 0.0
     _interrupted_wall_s: float = 0.0
     _hold_again_wall_s: float = 0.0
+    _missing_since_s: float | None = None
+    _land_again_s: float | None = None
     _was_at_target: bool = False
 
     def start(self, state: VehicleState, now_s: float) -> None:
@@ -108,6 +116,10 @@ class VehicleMonitor:
 
     def step(self, state: VehicleState, now_s: float) -> Mode | None:
         """Look at the vehicle; the mode that the ground has to command now, or None."""
+        if now_s - state.telemetry_s > LINK_TIMEOUT_S:
+            self.miss(now_s)
+        else:
+            self._missing_since_s = None
         if self.phase in CAN_COME_DOWN and self._down(state):
             return self._finish(state)
         match self.phase:
@@ -115,8 +127,21 @@ class VehicleMonitor:
                 return self._flying(state, now_s)
             case Phase.INTERRUPTED:
                 return self._interrupted(state, now_s)
+            case Phase.COMING_DOWN:
+                return self._coming_down(state, now_s)
             case _:
                 return None
+
+    def miss(self, now_s: float) -> None:
+        """It is not heard; after longer than it can fly the flight is over for it."""
+        self._missing_since_s = now_s if self._missing_since_s is None else self._missing_since_s
+        missing_s = (now_s - self._missing_since_s) * self.speed
+        if missing_s > self.endurance_s + LOST_S:
+            self.give_up(f"not heard for {missing_s:.0f} s, longer than it can fly")
+
+    def order_failed(self, now_s: float) -> None:
+        """The landing that the ground ordered by itself was refused, or not answered."""
+        self._land_again_s = now_s + ORDER_AGAIN_S
 
     def come_down(self, reason: str) -> None:
         """The ground has ordered a landing or a return."""
@@ -194,6 +219,13 @@ class VehicleMonitor:
             self.phase = Phase.COMING_DOWN
             return Mode.LAND
         return None
+
+    def _coming_down(self, state: VehicleState, now_s: float) -> Mode | None:
+        """A landing that was not carried out is ordered again, once it is heard; never against a pilot's mode."""
+        if self._land_again_s is None or now_s < self._land_again_s or now_s - state.telemetry_s > LINK_TIMEOUT_S:
+            return None
+        self._land_again_s = None
+        return Mode.LAND if state.mode in {Mode.HOLD, Mode.OFFBOARD, Mode.MISSION} else None
 
     def _holds_at_target(self, state: VehicleState) -> bool:
         if self.on_arrival is not OnArrival.HOLD or self.distance_to_target_m(state) > self.tolerance_m:

@@ -36,10 +36,6 @@ SETTLING_S, READY_TIMEOUT_S = 3.0, 60.0
 """A vehicle that is not ready after the first of them is asked why, and given until the second."""
 COMPANION_READY_TIMEOUT_S = 30.0
 
-OVERSHOOT_SHARE = 0.07
-"""Autopilots fly up to 5 % faster than ordered before they settle, so missions that they fly themselves order so much
-less than the plan has: all legs alike, or the fleet would not keep step."""
-
 FRAME_BYTES = 12
 """Of a MAVLink 2 frame besides its payload."""
 STREAM_RATES_HZ = {
@@ -168,7 +164,8 @@ def mission_items(
     if mode is PlanningMode.ONBOARD:
         track = plan.targets_alone
     if mode is PlanningMode.CLOUD:
-        track = replace(track, speeds_m_s=(1.0 - OVERSHOOT_SHARE) * track.speeds_m_s)
+        # all legs alike, or the fleet would not keep step
+        track = replace(track, speeds_m_s=(1.0 - safety_parameters.OVERSHOOT_SHARE) * track.speeds_m_s)
         endings = {OnArrival.LAND: ItemCommand.NAV_LAND, OnArrival.RTL: ItemCommand.NAV_RETURN_TO_LAUNCH}
         ending = endings.get(mission.on_arrival)
     return encode_track(

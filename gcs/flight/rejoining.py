@@ -1,6 +1,8 @@
 """Finding back into a flight that a crashed ground station has left alone: hear, download, compare; command nothing."""
 
 import asyncio
+import math
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import msgspec
@@ -65,31 +67,49 @@ async def _no_planner(mission: Mission, flown: FlownPlan = NO_FLOWN_PLAN, /) -> 
     raise FlightAborted(f"{mission.name} is only looked at")
 
 
-async def rejoin(flight: FleetFlight, events: EventLog) -> None:
-    """Look for the vehicles of a restored flight, whether they still fly or have come down meanwhile.
+async def rejoin(flight: FleetFlight, events: EventLog, follow: Callable[[], Awaitable[None]]) -> None:
+    """Look for the vehicles of a restored flight, whether they still fly or have come down meanwhile, and follow it.
 
     What is stored on them is downloaded and compared with what was uploaded. Nothing is commanded, and nothing will be
     without an operator's order.
+
+    Args:
+        flight: from a journal.
+        events: where it is told.
+        follow: follows the flight to its end; who has not been found is looked for meanwhile.
     """
     flight.passive = True
     aloft = list(flight.in_flight)
     names = ", ".join(part.name for part in aloft)
     events.add("rejoin", f"the last ground station left {names} in flight; looking for them, commanding nothing")
-    await asyncio.gather(*(_look(flight.station, part, events) for part in aloft))
-
-
-async def _look(station: Station, part: VehicleFlight, events: EventLog) -> None:
-    fleet = station.fleet.vehicles
-    if not await station.holds_within(lambda: _is_known(fleet.get(part.sysid)), HEARD_TIMEOUT_S):
-        events.add("rejoin", f"not heard within {HEARD_TIMEOUT_S:g} s", part.name, Severity.ERROR)
-        part.monitor.give_up("not heard after the restart of the ground station")
-        return
+    flight.sought = {part.sysid for part in aloft}
     try:
-        found = await upload.read(station, part.sysid)
+        async with asyncio.TaskGroup() as group:
+            looks = [group.create_task(_look(flight, part, events)) for part in aloft]
+            await follow()
+            for look in looks:
+                look.cancel()
+    except* GcsError as failures:
+        raise failures.exceptions[0] from None
+
+
+async def _look(flight: FleetFlight, part: VehicleFlight, events: EventLog) -> None:
+    station, fleet = flight.station, flight.station.fleet.vehicles
+
+    def found() -> bool:
+        return _is_known(fleet.get(part.sysid))
+
+    if not await station.holds_within(found, HEARD_TIMEOUT_S):
+        text = f"not heard within {HEARD_TIMEOUT_S:g} s; it is looked for further"
+        events.add("rejoin", text, part.name, Severity.ERROR)
+        await station.holds_within(found, math.inf)
+    flight.sought.discard(part.sysid)
+    try:
+        stored = await upload.read(station, part.sysid)
     except GcsError as problem:
         events.add("rejoin", f"its mission could not be compared: {problem}", part.name, Severity.ERROR)
         return
-    difference = first_difference(part.items, found)
+    difference = first_difference(part.items, stored)
     if difference:
         events.add("rejoin", f"another mission is stored than was uploaded: {difference}", part.name, Severity.ERROR)
     else:

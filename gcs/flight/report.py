@@ -154,13 +154,14 @@ def min_separation_m(flown: Sequence[Flown]) -> float | None:
 
 
 def _vehicle_report(flight: FleetFlight, part: VehicleFlight, flown: Flown | None) -> VehicleReport:
-    state = flight.state(part.sysid)
-    status = state.companion.status or CompanionStatus(state=CompanionState.CONNECTING)
+    state = flight.station.fleet.vehicles.get(part.sysid)  # none if it was not heard after a restart
+    told = state.companion.status if state is not None else None
+    status = told or CompanionStatus(state=CompanionState.CONNECTING)
     quality = flight.station.quality(part.sysid)
     received, lost = (quality.received, quality.lost) if quality is not None else (0, 0)
     moved = flown.in_flight() if flown else Flown(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
     clearance_m = min_clearance_m(flight.mission, moved)
-    landed = not state.armed
+    landed = state is not None and not state.armed
     return VehicleReport(
         name=part.name,
         sysid=part.sysid,

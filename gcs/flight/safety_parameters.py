@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from gcs.dialect import AUTOPILOT
 from gcs.errors import PreflightError
-from gcs.flight.fence import fence_height_m
+from gcs.flight.fence import fence_height_m, return_height_m
 from gcs.microservices.parameter_client import ParameterExchange, Value
 from gcs.station import Station
 from missions.mission import Mission
@@ -14,6 +14,9 @@ HOLD_ON_OFFBOARD_LOSS = 5
 """COM_OBL_RC_ACT: PX4's default, 0, sinks and lands where no sticks are."""
 
 OFFBOARD_LOSS_TIMEOUT_S = 1.0
+
+OVERSHOOT_SHARE = 0.07
+"""Autopilots fly up to 6 % faster than ordered before they settle: so much less is ordered of their own flight."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +36,15 @@ class Requirement:
 def requirements(mission: Mission, speed: float) -> tuple[Requirement, ...]:
     """What a flight of `mission` needs; with a speed factor the autopilot's loss times are wall-clock times, too."""
     timeout_s = OFFBOARD_LOSS_TIMEOUT_S * speed
+    own_speed_m_s = (1.0 - OVERSHOOT_SHARE) * mission.limits.cruise_speed_m_s
     return (
         Requirement("COM_OBL_RC_ACT", HOLD_ON_OFFBOARD_LOSS, "hold when the companion's setpoints stop"),
         Requirement("COM_OF_LOSS_T", timeout_s, "notice soon that setpoints stop", less_is_fine=True),
         Requirement("NAV_DLL_ACT", 0, "fly on without a link to the ground"),
         Requirement("GF_MAX_VER_DIST", fence_height_m(mission), "the fence's height"),
         Requirement("MPC_XY_VEL_MAX", mission.limits.cruise_speed_m_s, "never faster than the mission"),
+        Requirement("MPC_XY_CRUISE", own_speed_m_s, "returns and go-tos overshoot their speed", less_is_fine=True),
+        Requirement("RTL_RETURN_ALT", return_height_m(mission), "return below the ceiling", less_is_fine=True),
     )
 
 

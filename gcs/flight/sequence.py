@@ -77,6 +77,8 @@ class FleetFlight:
     candidates: dict[str, FleetPlan] = field(default_factory=dict[str, FleetPlan])
     """What each algorithm has made of this mission last."""
     vehicles: dict[int, VehicleFlight] = field(default_factory=dict[int, VehicleFlight])
+    sought: set[int] = field(default_factory=set[int])
+    """Vehicles that have not been found again after a restart in flight."""
 
     def __post_init__(self) -> None:
         self.cloud = CloudLoop(self)
@@ -263,11 +265,16 @@ class FleetFlight:
         except GcsError as problem:
             self.events.add("refused", str(problem), flight.name, Severity.ERROR)
             if flight.monitor.phase is not Phase.INTERRUPTED:
-                await self.orders.land(flight, f"its mission could not be started: {problem}")
+                flight.monitor.come_down(f"its mission could not be started: {problem}")
+                await self._order(flight, Mode.LAND)
 
     def _watch_one(self, flight: VehicleFlight, orders: asyncio.TaskGroup) -> None:
         before = flight.monitor.phase
-        order = flight.monitor.step(self.state(flight.sysid), self.station.now_s)
+        now_s, order = self.station.now_s, None
+        if flight.sysid in self.sought:
+            flight.monitor.miss(now_s)
+        else:
+            order = flight.monitor.step(self.state(flight.sysid), now_s)
         if flight.monitor.phase is not before:
             severity = Severity.INFO if flight.monitor.reached or not flight.monitor.reason else Severity.WARNING
             text = f"{before.value} -> {flight.monitor.phase.value}: {flight.monitor.reason}".rstrip(": ")
@@ -288,6 +295,8 @@ class FleetFlight:
                 await self.orders.command(flight, actions.set_mode(mode))
         except (CommandRefused, LinkLost) as problem:
             self.events.add("refused", str(problem), flight.name, Severity.ERROR)
+            if mode is Mode.LAND:
+                flight.monitor.order_failed(self.station.now_s)
 
     async def _abort_launch(self, reason: str) -> None:
         self.events.add("aborted", reason, severity=Severity.ERROR)

@@ -163,8 +163,7 @@ class Crashing(Audited):
         assert story is not None
         self.flight = told_flight(story, self.station, self.events)
         heartbeats = asyncio.create_task(self.station.send_heartbeats())
-        await rejoin(self.flight, self.events)
-        await self.flight.watch()
+        await rejoin(self.flight, self.events, self.flight.watch)
         await asyncio.sleep(LISTENS_S)
         heartbeats.cancel()
 

@@ -86,6 +86,36 @@ def test_a_link_that_goes_dark_at_the_take_off_ends_with_all_on_the_ground():
     assert "command" in kinds(system)[kinds(system).index("aborted") :]
 
 
+def test_a_ground_station_that_crashes_while_the_link_is_dark_goes_on_looking_for_its_vehicles():
+    crash = GroundCrash(phase=Phase.FLYING, after_s=2.0, down_s=1.0)
+    system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1, mishaps=(crash,))
+    system.simulator.order(LinkFault(link=SimulatedLink.GROUND, blackout_s=60.0, at_s=9.0))
+    report = system.fly()
+    assert any("looked for further" in event.text for event in system.events.events)
+    assert report.success, report.reason
+    assert all(vehicle.landed for vehicle in report.vehicles)
+
+
+def test_a_ground_station_that_never_hears_its_vehicles_again_says_so_in_its_report():
+    crash = GroundCrash(phase=Phase.FLYING, after_s=2.0, down_s=1.0)
+    system = TroubledSystem(INDOOR, PlanningMode.CLOUD, seed=1, mishaps=(crash,))
+    system.simulator.order(LinkFault(link=SimulatedLink.GROUND, blackout_s=3000.0, at_s=9.0))
+    report = system.fly()
+    assert not report.success
+    assert all("not heard for" in vehicle.reason and not vehicle.landed for vehicle in report.vehicles)
+
+
+def test_a_landing_that_a_dark_link_swallowed_is_ordered_again():
+    system = TroubledSystem(INDOOR, PlanningMode.END_CLOUD, seed=1, faults=(CompanionKill(vehicle=1, at_s=2.0),))
+    system.simulator.order(LinkFault(link=SimulatedLink.GROUND, vehicle=1, blackout_s=60.0, at_s=14.0))
+    system.fly()
+    told = [(event.kind, event.text) for event in system.events.events if event.vehicle == "alpha"]
+    assert told.count(("command", "land")) == 2
+    assert "no answer" in dict(told)["refused"]
+    assert system.flight.vehicles[1].monitor.phase is Phase.DONE
+    assert flown_by(system, 1).positions_m[-1, 2] < 0.2
+
+
 def test_what_the_ground_station_says_to_be_stored_is_looked_up_on_the_vehicle():
     system = flown()
     assert kinds(system).count("uploaded") == 2

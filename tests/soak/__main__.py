@@ -11,6 +11,9 @@ from gcs.flight.picture import draw_flight
 from tests.soak.experiment import SOAK, fly
 from tests.soak.scenario import draw
 
+MOST_PICTURES = 5
+"""Of so many flights that broke an invariant the events and the picture are shown at once."""
+
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -29,6 +32,8 @@ def main() -> int:
         console.print(f"seed {row['seed']}: {row['violations']}", markup=False)
         console.print(f"  again: .venv/bin/python -m tests.soak --replay {row['seed']}", markup=False)
     console.print(f"{len(rows)} flights, {sum(bool(row['success']) for row in rows)} arrived, {len(broken)} violations")
+    for row in broken[:MOST_PICTURES]:
+        replay(int(str(row["seed"])), options.output, console)  # what raised raises again, and is seen where
     return 1 if broken else 0
 
 

@@ -11,7 +11,9 @@ from gcs.flight.monitor import Phase
 from gcs.flight.report import FlightReport
 from missions.faults import GpsLoss, MotorFailure, Reboot, SensorNoise, SimulatorFault, Weather
 from sitl.autopilot.modes import Mode
+from sitl.dynamics.state import Crash
 from sitl.fleet import TICK_S
+from sitl.simulator import Collision
 from tests.soak.census import crowds
 from tests.soak.scenario import Scenario
 from tests.soak.troubled_system import TroubledSystem
@@ -37,6 +39,8 @@ UNANNOUNCED_S = 0.6, 3.0
 """Before and after a vehicle in motion leaves Offboard. Its setpoints may have ended half a second ago; the others rely
 on its last announced plan for 1.5 s, and need the rest for braking. Collisions count at all times."""
 IN_MOTION_M_S = 0.3
+BLIND_S = 8.0
+"""After it left Offboard in motion a vehicle is braked by its autopilot, which sees nothing, for so long."""
 ACCELERATION_WINDOW_S = 0.2
 ACCELERATION_SHARE = 1.5
 """Of the mission's limit, which is what is planned with: in brakings the autopilot's own corrections come on top."""
@@ -71,8 +75,16 @@ def excused(scenario: Scenario, sysid: int, kinds: tuple[type[SimulatorFault], .
 def _collisions(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
     for crash in system.simulator.collisions:
         involved = {crash.sysid, int(crash.other)} if crash.other.isdigit() else {crash.sysid}
-        if not any(excused(scenario, sysid, FALLING + ASTRAY) for sysid in involved):
+        if not _was_blind(system, crash) and not any(excused(scenario, sysid, FALLING + ASTRAY) for sysid in involved):
             yield f"collision: {crash}"
+
+
+def _was_blind(system: TroubledSystem, crash: Collision) -> bool:
+    """The autopilot alone flew, straight home on somebody's order or braking after its companion's end."""
+    at = min(round(crash.time_s / TICK_S), len(system.truth) - 1)
+    modes = [mode for since_s, mode in system.modes_in_truth[crash.sysid] if since_s <= crash.time_s]
+    alone = modes[-1] is Mode.RTL or bool(_breaks_its_word(system, crash.sysid, after_s=BLIND_S)[at])
+    return crash.what is Crash.OBSTACLE and alone
 
 
 def _out_of_bounds(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
@@ -83,6 +95,9 @@ def _out_of_bounds(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
         beyond_m = np.maximum(bounds.low_enu_m - flown.positions_m, flown.positions_m - bounds.high_enu_m)[:, :2].max()
         if beyond_m > margin_m:
             yield f"vehicle {sysid} was {beyond_m:.1f} m outside of its flight range"
+        above_m = float(flown.positions_m[:, 2].max() - bounds.high_enu_m[2])
+        if above_m > 0.0:
+            yield f"vehicle {sysid} was {above_m:.1f} m above its flight range"
 
 
 def _too_fast(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
@@ -110,10 +125,9 @@ def _too_near(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
             yield f"vehicles {one} and {other} were {apart_m.min():.2f} m apart"
 
 
-def _breaks_its_word(system: TroubledSystem, sysid: int) -> BoolArray:
+def _breaks_its_word(system: TroubledSystem, sysid: int, after_s: float = UNANNOUNCED_S[1]) -> BoolArray:
     """When a vehicle does not fly any more what its companion announced, and the others cannot have noticed."""
-    flown = system.flown()[sysid]
-    before_s, after_s = UNANNOUNCED_S
+    flown, before_s = system.flown()[sysid], UNANNOUNCED_S[0]
     broken = np.zeros(len(flown.times_s), bool)
     for (_, mode), (left_s, _) in pairwise(system.modes_in_truth[sysid]):
         velocity_m_s = flown.velocities_m_s[min(np.searchsorted(flown.times_s, left_s), len(broken) - 1)]

@@ -204,10 +204,9 @@ class TroubledSystem(WholeSystem):
         """The flight, or what is left of it with somebody at the page."""
         try:
             if rejoining:
-                await rejoin(self.flight, self.events)
                 async with asyncio.timeout(LONGEST_S), asyncio.TaskGroup() as group:
                     operator = group.create_task(self._land_who_waits())
-                    await self.flight.watch()
+                    await rejoin(self.flight, self.events, self.flight.watch)
                     operator.cancel()
             else:
                 await self.operate(self.flight)
@@ -237,6 +236,8 @@ class TroubledSystem(WholeSystem):
                 self._journal.look(self.flight, self.station.unix_us())
                 await asyncio.sleep(LOOK_INTERVAL_S)
         finally:
+            if not self.process.ended:  # as the program does when it ends, and cannot when it is killed
+                self._journal.look(self.flight, self.station.unix_us())
             self._journal.close()
 
     async def _companion(self, vehicle: Vehicle) -> None:

@@ -196,6 +196,14 @@ def test_the_autopilot_itself_flies_at_the_missions_speed_and_no_faster():
     assert not limit.met_by(2.0)
 
 
+@pytest.mark.parametrize(("name", "enough", "too_much"), [("MPC_XY_CRUISE", 2.5, 5.0), ("RTL_RETURN_ALT", 3.0, 30.0)])
+def test_what_the_autopilot_flies_by_itself_stays_in_the_room_and_within_the_speed(name, enough, too_much):
+    (limit,) = (required for required in requirements(INDOOR, speed=1.0) if required.name == name)
+    assert limit.met_by(enough)
+    assert not limit.met_by(too_much)
+    assert not limit.value > {"MPC_XY_CRUISE": 0.95 * 3.0, "RTL_RETURN_ALT": 4.0 - INDOOR.limits.clearance_m}[name]
+
+
 def flown(offset_m, speed_m_s: float = 1.0, begins_s: float = 0.0) -> Flown:
     times_s = np.arange(begins_s, 10.0, 0.1)
     along = np.stack((times_s * speed_m_s, np.zeros_like(times_s), np.ones_like(times_s)), axis=-1)

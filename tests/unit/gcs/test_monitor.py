@@ -8,6 +8,8 @@ from gcs.fleet.vehicle_state import LandedState, VehicleState
 from gcs.flight.monitor import (
     COMPANION_SILENCE_S,
     HOLD_AGAIN_S,
+    LOST_S,
+    ORDER_AGAIN_S,
     TAKEOVER_GRACE_S,
     UNATTENDED_HOLD_S,
     Phase,
@@ -290,3 +292,53 @@ def test_what_another_station_resumes_is_not_held_again():
     flight.say(CompanionState.FLYING)
     assert flight.wait(10.0) == []
     assert flight.monitor.phase is Phase.FLYING
+
+
+def refuse(flight: Flight) -> None:
+    """What the flight does when its order is not answered."""
+    flight.monitor.order_failed(flight.now_s)
+
+
+def test_a_landing_that_was_not_carried_out_is_ordered_again_when_the_vehicle_is_heard():
+    flight = Flight()
+    flight.companion_alive, flight.state.mode = False, Mode.HOLD
+    assert flight.wait(COMPANION_SILENCE_S + UNATTENDED_HOLD_S + 1.0) == [Mode.LAND]
+    flight.now_s += 30.0  # the link is gone
+    refuse(flight)
+    for _ in range(600):
+        flight.now_s += 0.1
+        assert flight.monitor.step(flight.state, flight.now_s) is None
+    assert flight.wait(ORDER_AGAIN_S + 1.0) == [Mode.LAND]
+    assert flight.wait(10.0) == [], "it was accepted: once is enough"
+
+
+def test_a_landing_that_was_refused_is_not_ordered_again_against_a_pilot():
+    flight = Flight()
+    flight.companion_alive, flight.state.mode = False, Mode.HOLD
+    assert flight.wait(COMPANION_SILENCE_S + UNATTENDED_HOLD_S + 1.0) == [Mode.LAND]
+    refuse(flight)
+    flight.state.mode = Mode.POSITION
+    assert flight.wait(ORDER_AGAIN_S + 10.0) == []
+
+
+def test_who_is_not_heard_for_longer_than_it_can_fly_is_given_up_and_nobody_before():
+    flight = Flight()
+    while flight.monitor.phase.in_flight:
+        flight.now_s += 1.0
+        assert flight.now_s < 1000.0
+        flight.monitor.step(flight.state, flight.now_s)
+    assert flight.monitor.endurance_s + LOST_S < flight.now_s - flight.state.telemetry_s < 320.0 + LOST_S
+    assert flight.monitor.phase is Phase.DONE
+    assert not flight.monitor.reached
+    assert "not heard for" in flight.monitor.reason
+
+
+def test_who_is_heard_now_and_then_is_not_given_up():
+    flight = Flight()
+    for _ in range(5):
+        for _ in range(300):
+            flight.now_s += 1.0
+            flight.monitor.step(flight.state, flight.now_s)
+        flight.monitor.started_s = flight.now_s
+        flight.wait(0.5)
+    assert flight.monitor.phase.in_flight
