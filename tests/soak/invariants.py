@@ -74,9 +74,14 @@ def excused(scenario: Scenario, sysid: int, kinds: tuple[type[SimulatorFault], .
 
 def _collisions(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
     for crash in system.simulator.collisions:
-        involved = {crash.sysid, int(crash.other)} if crash.other.isdigit() else {crash.sysid}
+        involved = [sysid for sysid in system.simulator.vehicles if _is_in(crash, sysid)]
         if not _was_blind(system, crash) and not any(excused(scenario, sysid, FALLING + ASTRAY) for sysid in involved):
             yield f"collision: {crash}"
+
+
+def _is_in(crash: Collision, sysid: int) -> bool:
+    """Whether this vehicle hit something, or was hit."""
+    return sysid == crash.sysid or (crash.other.isdigit() and sysid == int(crash.other))
 
 
 def _was_blind(system: TroubledSystem, crash: Collision) -> bool:
@@ -145,6 +150,8 @@ def _too_hard(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
         change_m_s = flown.velocities_m_s[window:] - flown.velocities_m_s[:-window]
         pushed_m_s2 = np.linalg.norm(change_m_s[:, :2], axis=1) / ACCELERATION_WINDOW_S
         pushed_m_s2[flown.positions_m[window:, 2] < AIRBORNE_M] = 0.0  # the ground pushes as hard as it likes
+        crashed_s = min((crash.time_s for crash in system.simulator.collisions if _is_in(crash, sysid)), default=np.inf)
+        pushed_m_s2[flown.times_s[window:] >= crashed_s] = 0.0  # and so does what it has hit: see `_collisions`
         by_companion = _in_offboard(system, sysid, flown.times_s[window:])
         limits_m_s2 = ACCELERATION_SHARE * scenario.truth.limits.acceleration_m_s2, AUTOPILOTS_ACCELERATION_M_S2
         for whose, flies, limit_m_s2 in zip(
