@@ -112,7 +112,8 @@ class Simulator:
         self._range_sensors = RangeSensors(mission, np.random.default_rng([seed, *b"lidar"])) if lidar else None
         self._lidar_out: list[tuple[int, bytes]] = []
         self._ticks = 0
-        self._first_takeoff_s: float | None = None
+        self.first_takeoff_s: float | None = None
+        """Faults and blackouts are counted from here on [s], as `time_s` is."""
         self._out: list[tuple[int, Link, bytes]] = []
         self.collisions: list[Collision] = []
         self._index = {vehicle.sysid: index for index, vehicle in enumerate(mission.vehicles)}
@@ -195,8 +196,8 @@ class Simulator:
                 if not way_in.is_perfect(now_s):
                     for datagram in way_in.arrived(Direction.UP, now_s):
                         self._deliver(sysid, link, datagram)
-            if self._first_takeoff_s is None and not snapshot.grounded:
-                self._first_takeoff_s = now_s
+            if self.first_takeoff_s is None and not snapshot.grounded:
+                self.first_takeoff_s = now_s
             if snapshot.crash != self._known_crashes[sysid]:
                 self._known_crashes[sysid] = snapshot.crash
                 self._note_collision(sysid)
@@ -235,7 +236,7 @@ class Simulator:
 
     @property
     def _since_takeoff_s(self) -> float | None:
-        return None if self._first_takeoff_s is None else self.time_s - self._first_takeoff_s
+        return None if self.first_takeoff_s is None else self.time_s - self.first_takeoff_s
 
     def _tick(self, sysid: int, snapshot: Snapshot) -> None:
         """Let one autopilot have its turn, if it is not booting."""

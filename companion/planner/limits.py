@@ -116,7 +116,8 @@ def surroundings(mission: Mission, obstacles: Obstacles, zones_m: Array) -> Surr
 def ends_of(start_m: Array, goal_m: Array, around: Surroundings, limits: FlightLimits) -> Array:
     """(2, 6) the start and the goal of a plan, each (3,) ENU [m], and what they have of all that is required.
 
-    A start may be anywhere; a goal counts as having at least what it takes not to touch anything.
+    A start may be anywhere; a goal counts as having at least what it takes not to touch anything, and the reserve: who
+    flies on to a goal beside which something is only seen on the way brakes before it touches that.
     """
     ends = np.empty((2, 6))
     for axis in range(3):
@@ -131,7 +132,7 @@ def ends_of(start_m: Array, goal_m: Array, around: Surroundings, limits: FlightL
             ends[i, END_CLEARANCE] = min(ends[i, END_CLEARANCE], mover_clearance(east, north, up, 0.0, around.moving))
         ends[i, END_HEIGHT] = up - terrain_height_at(east, north, around.obstacles) - ROUNDING_M
         ends[i, END_OUTSIDE] = outside(ends, i, around.room_m) + ROUNDING_M
-    ends[1, END_CLEARANCE] = max(ends[1, END_CLEARANCE], limits.contact_m)
+    ends[1, END_CLEARANCE] = max(ends[1, END_CLEARANCE], limits.contact_m + limits.reserve_m)
     ends[1, END_HEIGHT] = max(ends[1, END_HEIGHT], 0.0)
     return ends
 

@@ -31,6 +31,9 @@ NEWS_S = 2.0
 ORDER_AGAIN_S = 2.0
 """After an order of the ground's own was refused or not answered, it is given again as soon as this [s, wall clock]."""
 
+STILL_UP_S = 30.0
+"""A vehicle that was landed and holds so long after it has been overruled by somebody's late order [s, wall clock]."""
+
 LOST_S = 300.0
 """Who is not heard for longer than it may fly by so much has come down somewhere [s, vehicle time]."""
 
@@ -222,6 +225,8 @@ class VehicleMonitor:
 
     def _coming_down(self, state: VehicleState, now_s: float) -> Mode | None:
         """A landing that was not carried out is ordered again, once it is heard; never against a pilot's mode."""
+        if self._land_again_s is None and self.unattended:
+            self._land_again_s = now_s + STILL_UP_S
         if self._land_again_s is None or now_s < self._land_again_s or now_s - state.telemetry_s > LINK_TIMEOUT_S:
             return None
         self._land_again_s = None

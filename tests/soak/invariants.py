@@ -9,7 +9,16 @@ import numpy.typing as npt
 from gcs.fleet.vehicle_state import LandedState
 from gcs.flight.monitor import Phase
 from gcs.flight.report import FlightReport
-from missions.faults import GpsLoss, MotorFailure, Reboot, SensorNoise, SimulatorFault, Weather
+from missions.faults import (
+    GpsLoss,
+    LinkFault,
+    MotorFailure,
+    Reboot,
+    SensorNoise,
+    SimulatedLink,
+    SimulatorFault,
+    Weather,
+)
 from sitl.autopilot.modes import Mode
 from sitl.dynamics.state import Crash
 from sitl.fleet import TICK_S
@@ -38,6 +47,8 @@ SEPARATION_SHARE = 0.8
 UNANNOUNCED_S = 0.6, 3.0
 """Before and after a vehicle in motion leaves Offboard. Its setpoints may have ended half a second ago; the others rely
 on its last announced plan for 1.5 s, and need the rest for braking. Collisions count at all times."""
+HEARD_AGAIN_S = 3.0
+"""Plans that crossed each other while a radio was dark are made anew, and flown."""
 IN_MOTION_M_S = 0.3
 BLIND_S = 8.0
 """After it left Offboard in motion a vehicle is braked by its autopilot, which sees nothing, for so long."""
@@ -124,7 +135,8 @@ def _too_near(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:
         if any(excused(scenario, sysid, FALLING + ASTRAY + PUSHED) for sysid in (one, other)):
             continue
         judged = np.minimum(there.positions_m[:, 2], here.positions_m[:, 2]) > AIRBORNE_M
-        judged &= ~(_breaks_its_word(system, one) | _breaks_its_word(system, other))
+        for sysid in (one, other):
+            judged &= ~(_breaks_its_word(system, sysid) | _says_nothing(scenario, system, sysid))
         apart_m = np.linalg.norm(there.positions_m - here.positions_m, axis=1)[judged]
         if apart_m.min(initial=np.inf) < least_m:
             yield f"vehicles {one} and {other} were {apart_m.min():.2f} m apart"
@@ -139,6 +151,17 @@ def _breaks_its_word(system: TroubledSystem, sysid: int, after_s: float = UNANNO
         if mode is Mode.OFFBOARD and np.linalg.norm(velocity_m_s) > IN_MOTION_M_S:
             broken |= (flown.times_s > left_s - before_s) & (flown.times_s < left_s + after_s)
     return broken
+
+
+def _says_nothing(scenario: Scenario, system: TroubledSystem, sysid: int) -> BoolArray:
+    """When a vehicle's radio is dark, and until it is heard again: what it plans meanwhile nobody can keep clear of."""
+    times_s, taken_off_s = system.flown()[sysid].times_s, system.simulator.first_takeoff_s
+    mute = np.zeros(len(times_s), bool)
+    for fault in scenario.faults:
+        if isinstance(fault, LinkFault) and fault.link is SimulatedLink.FLEET and fault.vehicle in {None, sysid}:
+            since_s = (fault.at_s or 0.0) + (taken_off_s or 0.0)
+            mute |= (times_s > since_s) & (times_s < since_s + fault.blackout_s + HEARD_AGAIN_S)
+    return mute
 
 
 def _too_hard(scenario: Scenario, system: TroubledSystem) -> Iterator[str]:

@@ -10,6 +10,7 @@ from gcs.flight.monitor import (
     HOLD_AGAIN_S,
     LOST_S,
     ORDER_AGAIN_S,
+    STILL_UP_S,
     TAKEOVER_GRACE_S,
     UNATTENDED_HOLD_S,
     Phase,
@@ -310,6 +311,16 @@ def test_a_landing_that_was_not_carried_out_is_ordered_again_when_the_vehicle_is
         assert flight.monitor.step(flight.state, flight.now_s) is None
     assert flight.wait(ORDER_AGAIN_S + 1.0) == [Mode.LAND]
     assert flight.wait(10.0) == [], "it was accepted: once is enough"
+
+
+def test_a_landing_that_somebodys_late_order_has_ended_is_ordered_again():
+    flight = Flight()
+    flight.companion_alive, flight.state.mode = False, Mode.HOLD
+    assert flight.wait(COMPANION_SILENCE_S + UNATTENDED_HOLD_S + 1.0) == [Mode.LAND]
+    flight.state.mode = Mode.LAND
+    assert flight.wait(2.0 * STILL_UP_S) == []
+    flight.state.mode = Mode.HOLD
+    assert flight.wait(STILL_UP_S + 1.0) == [Mode.LAND]
 
 
 def test_a_landing_that_was_refused_is_not_ordered_again_against_a_pilot():

@@ -3,12 +3,15 @@
 from collections import deque
 from dataclasses import replace
 
+import msgspec
 import pytest
 
 from gcs.experiments.experiment import Run
 from gcs.flight.monitor import Phase
 from gcs.settings import PlanningMode
-from missions.faults import MotorFailure
+from missions.faults import LinkFault, MotorFailure, SimulatedLink
+from sitl.dynamics.state import Crash
+from sitl.simulator import Collision
 from tests.soak import experiment
 from tests.soak.census import crowds
 from tests.soak.invariants import excused, violations
@@ -63,6 +66,22 @@ def test_what_companions_must_not_do_is_found(flown):
     found = " ".join(violations(with_companions, system, report))
     for words in ("vehicles 1 and 2 were 0.00 m apart", "its autopilot accelerated vehicle 1 by"):
         assert words in found
+
+
+def test_who_has_no_radio_is_not_kept_at_a_distance_but_must_not_be_hit(flown, monkeypatch: pytest.MonkeyPatch):
+    scenario, system, report, _, _ = flown
+    since_s = system.simulator.first_takeoff_s
+    beside = [(t_s, at_m[[0, 0]] + [0.0, 0.0, 1.0], v_m_s) for t_s, at_m, v_m_s in system.truth if t_s > since_s]
+    monkeypatch.setattr(system, "truth", beside)
+    for blackout_s, judged in ((600.0, False), (1.0, True)):
+        dark = LinkFault(link=SimulatedLink.FLEET, vehicle=2, blackout_s=blackout_s, at_s=0.0)
+        simulation = msgspec.structs.replace(scenario.truth.simulation, faults=(dark,))
+        truth = msgspec.structs.replace(scenario.truth, simulation=simulation)
+        mute = replace(scenario, mode=PlanningMode.END_CLOUD, truth=truth)
+        assert ("0.00 m apart" in " ".join(violations(mute, system, report))) == judged
+    touched = Collision(since_s + 0.5, 1, Crash.VEHICLE, (0.0, 0.0, 1.0), "2")
+    monkeypatch.setattr(system.simulator, "collisions", [touched])
+    assert "collision" in " ".join(violations(mute, system, report))
 
 
 def test_what_piles_up_is_found_wherever_it_is(flown):

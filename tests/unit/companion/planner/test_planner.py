@@ -215,6 +215,18 @@ def test_the_check_notices_who_passes_something_too_fast_but_gives_the_time_to_b
     assert PLANNER.outlook(braking, braking.start_s + 0.4 * braking.duration_s).too_fast_s == np.inf
 
 
+@pytest.mark.parametrize(("off_m", "is_danger"), [(0.1, True), (0.17, True), (0.3, False)])
+def test_who_flies_to_a_goal_beside_which_something_was_found_meanwhile_brakes_before_it_touches_that(
+    off_m: float, is_danger: bool
+):
+    goal_m = np.array([7.0, 5.5 - off_m, 1.5])
+    control = np.vstack((np.linspace([7.0, 2.5, 1.5], goal_m, 8), np.tile(goal_m, (2, 1))))
+    trajectory = Trajectory(control, 0.0, 1.0)
+    outlook = PLANNER.outlook(trajectory, 0.0)
+    assert (outlook.lacks_s < trajectory.end_s) == is_danger
+    assert (outlook.dangerous_s < trajectory.end_s) == is_danger
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_braking_stays_on_the_path_and_stops_within_the_limits(seed: int):
     rng = np.random.default_rng(seed)
